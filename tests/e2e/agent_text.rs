@@ -172,7 +172,7 @@ fn agent_output_and_names_contain_no_control_characters() {
         (
             "log",
             "sys.stderr.write('\\x1b[2J\\x1b]0;owned\\x07 a\\u202eb \\x9b31m\\n'); sys.exit(3)",
-            "\\u001b[2J",
+            "a\\u202eb \\u009b31m",
         ),
         (
             "line",

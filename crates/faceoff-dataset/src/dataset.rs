@@ -18,6 +18,7 @@ pub use steps::{StepBatches, StepTable};
 pub(crate) use container::Container;
 pub(crate) use episodes::{Columns, batches as episode_batches};
 pub(crate) use file_range::FileRange;
+pub(crate) use footer::check_table;
 pub(crate) use steps::{BATCH_ROWS, check_columns};
 
 use crate::{
@@ -33,19 +34,12 @@ use arrow_array::RecordBatch;
 use faceoff_types::{Competition, EvaluationResult, MAX_EPISODES_PER_TASK, Task};
 use faceoff_wire::dataset::{CalibrationFile, DatasetManifest, FileDigest, ViolationsFile};
 use fs_err as fs;
-use parquet::{errors::ParquetError, file::metadata::ParquetMetaData};
 use serde::Deserialize;
 use std::{
     collections::BTreeSet,
     path::{Path, PathBuf},
     sync::Arc,
 };
-
-/// Checks what a table states about its own sizes before its columns are read.
-pub(crate) fn check_table(table: &FileRange, footer: &ParquetMetaData) -> Result<(), ParquetError> {
-    footer::check(footer, table.bytes)?;
-    pages::check(table, footer)
-}
 
 /// All files of a dataset except its manifest.
 const FILES: [&str; 6] = [

@@ -1,6 +1,6 @@
 //! Reads `episodes.parquet`, a dataset's table with one row per episode.
 
-use super::{check_table, file_range::FileRange, steps::check_columns};
+use super::{file_range::FileRange, footer::check_table, steps::check_columns};
 use crate::{error::DatasetError, files::EPISODES_FILE, table::EpisodeRows};
 use arrow_array::{
     Array, BooleanArray, Float64Array, RecordBatch, StringArray, UInt32Array,

@@ -1,6 +1,7 @@
 //! Checks the footer of a Parquet table, which states where each column lies. The Parquet library trusts these positions,
 //! so they are checked before it reads columns.
 
+use super::{file_range::FileRange, pages};
 use parquet::{
     errors::{ParquetError, Result},
     file::metadata::{ColumnChunkMetaData, ParquetMetaData},
@@ -13,6 +14,12 @@ const MAX_GROUP_ROWS: i64 = 1 << 24;
 const MAX_VALUE_BYTES: u64 = 4096;
 /// Size of a column of a row group that is always read: a few values may be longer.
 const SMALL_COLUMN_BYTES: u64 = 1 << 20;
+
+/// Checks what a table states about its own sizes, in its footer and in its pages, before its columns are read.
+pub(crate) fn check_table(table: &FileRange, footer: &ParquetMetaData) -> Result<()> {
+    check(footer, table.bytes)?;
+    pages::check(table, footer)
+}
 
 /// Refuses negative numbers, columns that are not within the table, whose size is `table_bytes`, and columns that a small table
 /// states as far larger than such values are.

@@ -1,6 +1,6 @@
 //! Reads `steps.parquet`, a dataset's table with one row per control step.
 
-use super::{check_table, file_range::FileRange};
+use super::{file_range::FileRange, footer::check_table};
 use crate::{
     error::DatasetError,
     files::STEPS_FILE,

@@ -101,7 +101,7 @@ async fn baseline_is_set_by_organiser_and_not_entered_in_tournaments() {
         .post(
             "/api/v1/tournaments",
             Some(ADMIN),
-            &json!({ "name": "TestTournament" }),
+            &json!({ "name": "Cup" }),
         )
         .await
         .json(201);

@@ -25,7 +25,7 @@ async fn old_route_answers_like_its_new_one() {
     assert_eq!(site.get(url, None).await.status, 200);
 
     site.team("Beta").await;
-    let tournament = json!({ "name": "TestTournament", "teams": ["Alpha", "Beta"] });
+    let tournament = json!({ "name": "Cup", "teams": ["Alpha", "Beta"] });
     let cup = site
         .post("/api/v1/tournaments", Some(ADMIN), &tournament)
         .await

@@ -44,7 +44,7 @@ async fn feed_lists_news_newest_first_with_stable_ids() {
     let path = "/api/v1/announcements";
     site.post(path, Some(ADMIN), &announcement).await.json(201);
     site.advance(60);
-    let cup = json!({ "name": "TestTournament", "teams": ["Alpha", "Beta"] });
+    let cup = json!({ "name": "Cup", "teams": ["Alpha", "Beta"] });
     let cup = site.post("/api/v1/tournaments", Some(ADMIN), &cup).await;
     assert_eq!(cup.status, 201, "{}", cup.body);
     site.advance(60);
@@ -56,8 +56,8 @@ async fn feed_lists_news_newest_first_with_stable_ids() {
     assert_eq!(
         titles(&feed),
         [
-            "TestTournament: round 1 has begun",
-            "The tournament TestTournament is open",
+            "Cup: round 1 has begun",
+            "The tournament Cup is open",
             special,
             "Qualifying: the day 2026-03-01 is released",
             "Qualifying is open"

@@ -327,7 +327,7 @@ async fn array_instead_of_an_object_is_refused() {
         (
             Method::POST,
             "/api/v1/tournaments",
-            json!({"name": "TestTournament", "rules": {"game_limits": [0.02, 10, 3600.0, 10.0]}}),
+            json!({"name": "Cup", "rules": {"game_limits": [0.02, 10, 3600.0, 10.0]}}),
         ),
     ] {
         let request = site.request(method, path, Some(ADMIN)).json(&body);

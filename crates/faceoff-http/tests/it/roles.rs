@@ -240,7 +240,7 @@ fn harmless_body(route: &str) -> Value {
 async fn played_test_game(site: &Site, team: &TestTeam) -> [String; 2] {
     let baseline_team = site.team("Organisers").await;
     let baseline = site.valid_submission(&baseline_team, "baseline").await;
-    let cup = json!({ "name": "TestTournament", "teams": ["Alpha"] });
+    let cup = json!({ "name": "Cup", "teams": ["Alpha"] });
     let opened = site.post("/api/v1/tournaments", Some(ADMIN), &cup).await;
     let path = opened.header("location").to_owned();
     let baseline = json!({ "baseline": baseline.rsplit('/').next().unwrap() });

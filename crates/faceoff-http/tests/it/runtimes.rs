@@ -269,7 +269,7 @@ async fn agent_environment_is_public() {
     site.change_first_stage(settings).await.json(200);
     site.team("Alpha").await;
     let rules = json!({ "runtimes": ["native"], "limits": { "pids": 16 } });
-    let cup = json!({ "name": "TestTournament", "teams": ["Alpha"], "rules": rules });
+    let cup = json!({ "name": "Cup", "teams": ["Alpha"], "rules": rules });
     site.post("/api/v1/tournaments", Some(ADMIN), &cup)
         .await
         .json(201);
@@ -293,7 +293,7 @@ async fn agent_environment_is_public() {
         "0.25 s",
         "A CPU",
         "Qualifying",
-        "TestTournament",
+        "Cup",
         "does not work",
         "--like-server",
         "/api/v1/runtimes",

@@ -263,7 +263,7 @@ async fn second_competition_runs_on_the_real_server() {
     );
     let missing = site.get("/nothing-here", None).await;
     assert!(!missing.body.contains("airhockey"), "{}", missing.body);
-    let cup = json!({ "name": "TestTournament", "teams": ["idle", "hasty"] });
+    let cup = json!({ "name": "Cup", "teams": ["idle", "hasty"] });
     site.post("/api/v1/tournaments", Some(ADMIN), &cup)
         .await
         .problem(422, "invalid-content", &["no games of two agents"]);

@@ -272,14 +272,17 @@ pub(crate) async fn log(
     .ok_or(StoreError::NotFound("submission"))
 }
 
-/// Empties the logs of the team's other invalid submissions of an identical bundle: [`log`] finds this submission's.
+/// Empties all but the newest log of the team's invalid submissions of the bundle of this submission: [`log`] finds that for all.
 pub(crate) async fn share_log(connection: &mut SqliteConnection, id: SubmissionId) -> Result<()> {
     sqlx::query!(
-        "UPDATE submissions SET log = ''
-         WHERE id <> ?1 AND state = 'invalid' AND log <> ''
-           AND team_id = (SELECT team_id FROM submissions WHERE id = ?1)
-           AND bundle_blake3 = (SELECT bundle_blake3 FROM submissions WHERE id = ?1)
-           AND EXISTS (SELECT 1 FROM submissions WHERE id = ?1 AND log <> '')",
+        "UPDATE submissions AS old SET log = ''
+         WHERE old.team_id = (SELECT team_id FROM submissions WHERE id = ?1)
+           AND old.bundle_blake3 = (SELECT bundle_blake3 FROM submissions WHERE id = ?1)
+           AND old.state = 'invalid' AND old.log <> ''
+           AND EXISTS (SELECT 1 FROM submissions new
+                       WHERE new.team_id = old.team_id AND new.bundle_blake3 = old.bundle_blake3
+                         AND new.state = 'invalid' AND new.log <> ''
+                         AND (new.created_at, new.id) > (old.created_at, old.id))",
         id
     )
     .execute(connection)

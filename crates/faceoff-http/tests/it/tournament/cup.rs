@@ -40,7 +40,7 @@ impl TestTournament {
             site.valid_submission(&team, &format!("{name}-agent")).await;
             teams.insert((*name).to_owned(), team);
         }
-        body["name"] = json!("TestTournament");
+        body["name"] = json!("Cup");
         if body.get("teams").is_none() {
             body["teams"] = json!(names);
         }

@@ -314,7 +314,7 @@ async fn paused_tournament_finishes_running_games_only() {
 #[tokio::test]
 async fn closed_tournament_does_not_change() {
     let cup = TestTournament::open(&["A", "B"], json!({})).await;
-    let close = json!({ "confirm": "TestTournament" });
+    let close = json!({ "confirm": "Cup" });
     cup.start_round().await;
     cup.post("close", close.clone())
         .await
@@ -354,7 +354,7 @@ async fn closed_tournament_does_not_change() {
 async fn rules_are_fixed_after_the_first_round_starts() {
     let cup = TestTournament::open(&["A", "B"], json!({ "rules": { "steps": 1500 } })).await;
     let changed = cup
-        .change(json!({ "name": "Grand TestTournament", "rules": { "mirrored": true }, "settings": { "free_games_per_day": 1 } }))
+        .change(json!({ "name": "Grand Cup", "rules": { "mirrored": true }, "settings": { "free_games_per_day": 1 } }))
         .await
         .json(200);
     assert_eq!(
@@ -363,7 +363,7 @@ async fn rules_are_fixed_after_the_first_round_starts() {
             &changed["rules"]["steps"],
             &changed["rules"]["mirrored"]
         ),
-        (&json!("Grand TestTournament"), &json!(1500), &json!(true)),
+        (&json!("Grand Cup"), &json!(1500), &json!(true)),
         "omitted settings do not change"
     );
     assert_eq!(

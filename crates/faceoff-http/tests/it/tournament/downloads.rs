@@ -81,7 +81,7 @@ async fn own_side_is_available_at_once_and_both_once_published() {
             public_statuses(is_public_after_round),
             "{publishes}, over"
         );
-        cup.post("close", json!({ "confirm": "TestTournament" }))
+        cup.post("close", json!({ "confirm": "Cup" }))
             .await
             .json(200);
         assert_eq!(

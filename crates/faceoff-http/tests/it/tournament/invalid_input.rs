@@ -16,82 +16,79 @@ async fn invalid_tournament_is_refused_with_the_reason() {
         (json!({}), &["name"][..]),
         (json!({ "name": "" }), &["name"]),
         (
-            json!({ "name": "TestTournament", "teams": ["A", "a"] }),
+            json!({ "name": "Cup", "teams": ["A", "a"] }),
             &["teams", "twice"],
         ),
         (
-            json!({ "name": "TestTournament", "teams": ["Unknown"] }),
+            json!({ "name": "Cup", "teams": ["Unknown"] }),
             &["teams", "no team", "Unknown"],
         ),
         (
-            json!({ "name": "TestTournament", "stage": "Final" }),
+            json!({ "name": "Cup", "stage": "Final" }),
             &["stage", "Qualifying", "Final"],
         ),
         (
-            json!({ "name": "TestTournament", "rules": { "steps": 0 } }),
+            json!({ "name": "Cup", "rules": { "steps": 0 } }),
             &["rules", "steps", "got 0"],
         ),
         (
-            json!({ "name": "TestTournament", "rules": { "step": 1 } }),
+            json!({ "name": "Cup", "rules": { "step": 1 } }),
             &["rules", "step"],
         ),
         (
-            json!({ "name": "TestTournament", "rules": { "profile": "easy" } }),
+            json!({ "name": "Cup", "rules": { "profile": "easy" } }),
             &["rules", "profile", "easy", "expected ideal"],
         ),
         (
-            json!({ "name": "TestTournament", "rules": { "ruleset": "airhockey-2023.1" } }),
+            json!({ "name": "Cup", "rules": { "ruleset": "airhockey-2023.1" } }),
             &["ruleset", "leave it out"],
         ),
         (
-            json!({ "name": "TestTournament", "rules": { "format": { "kind": "knockout" } } }),
+            json!({ "name": "Cup", "rules": { "format": { "kind": "knockout" } } }),
             &["rules", "knockout"],
         ),
         (
-            json!({ "name": "TestTournament", "rules": { "format": { "kind": "groups", "groups": 0, "advance": 1 } } }),
+            json!({ "name": "Cup", "rules": { "format": { "kind": "groups", "groups": 0, "advance": 1 } } }),
             &["format.groups"],
         ),
         (
-            json!({ "name": "TestTournament", "rules": { "format": { "kind": "swiss", "rounds": 101 } } }),
+            json!({ "name": "Cup", "rules": { "format": { "kind": "swiss", "rounds": 101 } } }),
             &["1 to 100"],
         ),
         (
-            json!({ "name": "TestTournament", "rules": { "runtimes": ["fortran"] } }),
+            json!({ "name": "Cup", "rules": { "runtimes": ["fortran"] } }),
             &["runtimes", "native, python3"],
         ),
         (
-            json!({ "name": "TestTournament", "rules": { "limits": { "pids": 1 } } }),
+            json!({ "name": "Cup", "rules": { "limits": { "pids": 1 } } }),
             &["limits.pids"],
         ),
         (
-            json!({ "name": "TestTournament", "rules": { "game_limits": { "in_time_s": 0 } } }),
+            json!({ "name": "Cup", "rules": { "game_limits": { "in_time_s": 0 } } }),
             &["game_limits.in_time_s"],
         ),
         (
-            json!({ "name": "TestTournament", "rules": { "perturbations": { "model_mismatch": { "static_error_m": [0.9, 1] } } } }),
+            json!({ "name": "Cup", "rules": { "perturbations": { "model_mismatch": { "static_error_m": [0.9, 1] } } } }),
             &["model_mismatch"],
         ),
         (
-            json!({ "name": "TestTournament", "settings": { "free_games_per_day": 1001 } }),
+            json!({ "name": "Cup", "settings": { "free_games_per_day": 1001 } }),
             &["settings", "expected 0 to 1000"],
         ),
         (
-            json!({ "name": "TestTournament", "settings": { "publishes": "soon" } }),
+            json!({ "name": "Cup", "settings": { "publishes": "soon" } }),
             &["settings", "soon"],
         ),
-        (
-            json!({ "name": "TestTournament", "entrants": [] }),
-            &["entrants"],
-        ),
+        (json!({ "name": "Cup", "entrants": [] }), &["entrants"]),
     ] {
         let answer = create(body.clone()).await;
         assert_eq!(answer.status, 422, "{body}: {}", answer.body);
         answer.problem(422, "invalid-content", words);
     }
-    create(json!({ "name": "TestTournament", "stage": UNKNOWN_ID }))
+    create(json!({ "name": "Cup", "stage": UNKNOWN_ID }))
         .await
         .problem(404, "not-found", &["stage"]);
-    create(json!({ "name": "TestTournament", "teams": ["A"] }))
+    create(json!({ "name": "Cup", "teams": ["A"] }))
         .await
         .json(201);
     create(json!({ "name": "cup", "teams": [] })).await.problem(
