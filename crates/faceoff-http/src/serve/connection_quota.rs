@@ -80,7 +80,7 @@ mod tests {
 
     #[test]
     fn connections_are_limited_per_address_and_ipv6_network() {
-        let quota = Arc::new(ConnectionQuota::new(2, vec![address("10.0.0.9")]));
+        let quota = Arc::new(ConnectionQuota::new(2, vec![address("10.0.0.9").into()]));
         let acquire = |text| quota.acquire(address(text));
         let permits = [acquire("10.0.0.1"), acquire("::ffff:10.0.0.1")];
         assert!(permits.iter().all(Option::is_some));
