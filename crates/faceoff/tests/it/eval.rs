@@ -334,7 +334,7 @@ fn invalid_evaluation_is_refused_with_a_reason() {
     refused(
         &dir.path().join("b"),
         &["--episodes", "20"],
-        "\"fortran\" of agent.toml is not offered",
+        "the runtime \"fortran\", which this machine does not have",
     );
 }
 
