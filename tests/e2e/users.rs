@@ -60,6 +60,7 @@ fn commands_invite_and_remove_users() {
     // An organiser, by a link that is valid once.
     let invited = people(&["invite-organiser", "Grace"]).expect_success();
     let link = find_word(&invited, "/join/fo_invite_");
+    assert!(link.starts_with(&server.url), "{link} leads to the server");
     join(&server, "nonsense", &["--name", "Grace"])
         .expect_refusal(FAILED, &["expected a link like"]);
     join(&server, &format!("{link}x"), &["--name", "Grace"])

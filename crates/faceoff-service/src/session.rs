@@ -95,6 +95,16 @@ pub fn check_cookie_is_kept(
     ))
 }
 
+/// A link of a server without a public address, completed with the address at which the browser has this page. Forms send it.
+pub fn absolute_link(headers: &HeaderMap, link: String) -> String {
+    let origin = headers.get(header::ORIGIN);
+    let origin = origin.and_then(|value| value.to_str().ok());
+    match origin.filter(|origin| origin.starts_with("http")) {
+        Some(origin) if link.starts_with('/') => format!("{origin}{link}"),
+        _ => link,
+    }
+}
+
 /// Refuses a request that a page of another site triggered. Browsers name the requesting site in a header. A request without
 /// this header is refused, too: it comes from an API client, and these use tokens.
 pub fn check_same_origin(headers: &HeaderMap) -> Result<(), Problem> {

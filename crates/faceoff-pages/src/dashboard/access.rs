@@ -12,7 +12,7 @@ use askama::Template;
 use axum::{
     Router,
     extract::{Query, State},
-    http::StatusCode,
+    http::{HeaderMap, StatusCode},
     response::{IntoResponse, Response},
     routing::{get, post},
 };
@@ -26,6 +26,7 @@ use faceoff_service::{
     extract::{PageForm, PathParam},
     problem::Problem,
     services::{invitations, tokens, users},
+    session,
     views::{credentials, event, invitation, token, user},
 };
 use faceoff_types::{InvitationId, TeamId, TeamName, TokenId, UserId};
@@ -427,6 +428,7 @@ fn invitation_request(caller: &Caller, form: &InvitationForm) -> Result<NewInvit
 async fn invite(
     PageUser(caller): PageUser,
     State(app): State<App>,
+    headers: HeaderMap,
     form: Result<PageForm<InvitationForm>, Problem>,
 ) -> Result<Response, PageProblem> {
     let PageForm(form) = form?;
@@ -437,7 +439,8 @@ async fn invite(
     match invitation {
         Ok(view) => {
             let title = format!("Invitation link “{}”", view.invitation.note);
-            page_with_secret(&app, &caller, (title, view.link)).await
+            let link = session::absolute_link(&headers, view.link);
+            page_with_secret(&app, &caller, (title, link)).await
         }
         Err(problem) => {
             let state = PageState {

@@ -27,9 +27,14 @@ impl Client {
             LinkTarget::Recording(id) => format!("/games/{id}/recording/link"),
         };
         let mut link: LinkView = self.post(&path, &new).await?;
-        if link.url.starts_with('/') {
-            link.url.insert_str(0, &self.address.base);
-        }
+        self.make_absolute(&mut link.url);
         Ok(link)
+    }
+
+    /// Completes a link of a server without a public address: this client's address leads to it.
+    pub(super) fn make_absolute(&self, url: &mut String) {
+        if url.starts_with('/') {
+            url.insert_str(0, &self.address.base);
+        }
     }
 }

@@ -78,12 +78,16 @@ impl Client {
 
     /// Registers a team; only this response has its link.
     pub async fn register(&self, new: &RegistrationRequest) -> anyhow::Result<NewRegistrationView> {
-        self.post("/registrations", new).await
+        let mut created: NewRegistrationView = self.post("/registrations", new).await?;
+        self.make_absolute(&mut created.join_link);
+        Ok(created)
     }
 
     /// Creates an invitation; only this response has its link.
     pub async fn invite(&self, new: &NewInvitation) -> anyhow::Result<NewInvitationView> {
-        self.post("/invitations", new).await
+        let mut created: NewInvitationView = self.post("/invitations", new).await?;
+        self.make_absolute(&mut created.link);
+        Ok(created)
     }
 
     /// The invitations that the caller may manage, the newest first.
