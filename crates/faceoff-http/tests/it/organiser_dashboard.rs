@@ -7,6 +7,7 @@ use crate::{
     site::{ADMIN, Answer, Site, TestTeam, result, string},
     team_dashboard::{dashboard_page, redirect_target},
 };
+use scraper::Html;
 use serde_json::{Value, json};
 
 /// The browser of Grace, an organiser.
@@ -332,7 +333,7 @@ async fn organiser_approves_changes_and_disqualifies_teams() {
         .submit("/organiser/access/invitations", &founder)
         .await;
     // The links have the address of the page that shows them.
-    let path_of_link = |created: &str| -> String {
+    let path_of_link = |created: &Html| -> String {
         let link = texts(created, ".secret code").remove(0);
         let path = link.strip_prefix(&site.url);
         path.unwrap_or_else(|| panic!("{link}")).to_owned()
