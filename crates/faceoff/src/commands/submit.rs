@@ -149,13 +149,19 @@ fn print_timing(timing: &ValidationTiming) {
         timing.points_per_episode
     );
     let limits: Vec<String> = timing.violations.iter().map(violation_text).collect();
-    match (timing.episodes, limits.is_empty()) {
-        (0, _) => {}
-        (episodes, true) => println!("         no violated limits in {episodes} episodes"),
-        (episodes, false) => println!(
-            "         violated limits in {episodes} episodes: {}; they cost penalty points",
+    let episodes = match timing.episodes {
+        // A validation run by an earlier version.
+        0 => return,
+        1 => "1 episode".to_owned(),
+        count => format!("{count} episodes"),
+    };
+    if limits.is_empty() {
+        println!("         no violated limits in {episodes}");
+    } else {
+        println!(
+            "         violated limits in {episodes}: {}; they cost penalty points",
             limits.join(", ")
-        ),
+        );
     }
 }
 
