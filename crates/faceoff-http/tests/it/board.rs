@@ -256,7 +256,7 @@ async fn board_page_shows_next_steps_and_progress() {
     let html = page(&site, "/").await;
     let empty = texts(&html, ".empty").join(" ");
     for part in [
-        "faceoff admin create-team",
+        "faceoff admin people invite-team",
         "faceoff submit",
         "faceoff admin start-day",
     ] {

@@ -114,7 +114,7 @@ async fn board_rows_are_newest_best_or_mean_as_configured() {
         "mean over its last 2 days",
         "(mean of 2 days)",
         "0.45 per episode",
-        "Not computed for means",
+        "Not computed where the board shows the mean of several days",
     ] {
         assert!(page.contains(words), "{words} is not in {page}");
     }
