@@ -24,6 +24,14 @@ pub(crate) fn check_table(table: &FileRange, footer: &ParquetMetaData) -> Result
 /// Refuses negative numbers, columns that are not within the table, whose size is `table_bytes`, and columns that a small table
 /// states as far larger than such values are.
 pub(super) fn check(footer: &ParquetMetaData, table_bytes: u64) -> Result<()> {
+    // Columns that share bytes would make a small table as costly as a large one.
+    let columns = footer.row_groups().iter().flat_map(|group| group.columns());
+    let sizes = columns.map(|column| column.compressed_size().unsigned_abs());
+    if sizes.fold(0, u64::saturating_add) > table_bytes {
+        return Err(ParquetError::General(
+            "the columns together are larger than the table".to_owned(),
+        ));
+    }
     for (number, group) in footer.row_groups().iter().enumerate() {
         let columns = group.columns().iter();
         if group.num_rows() > MAX_GROUP_ROWS {

@@ -72,7 +72,8 @@ fn larger_than_stated(column: &ColumnChunkMetaData) -> ParquetError {
 /// Reads the header of the page at the start of a range that the page must not leave.
 fn read_header(table: &impl ChunkReader, range: Range<u64>) -> Result<PageSizes> {
     let available = usize::try_from(range.end - range.start).unwrap_or(usize::MAX);
-    for length in [HEADER_BYTES, MAX_HEADER_BYTES] {
+    let lengths = std::iter::successors(Some(HEADER_BYTES), |length| Some(2 * length));
+    for length in lengths.take_while(|length| *length <= MAX_HEADER_BYTES) {
         let bytes = table.get_bytes(range.start, length.min(available))?;
         match parse_header(&bytes) {
             Ok(page) if page.header + page.compressed <= range.end - range.start => {
@@ -176,10 +177,10 @@ impl<R: ChunkReader> ChunkReader for IndexedPages<R> {
     fn get_bytes(&self, start: u64, length: usize) -> Result<Bytes> {
         let bytes = self.table.get_bytes(start, length)?;
         if let Some(max_bytes) = self.max_bytes.get(&start)
-            && parse_header(&bytes).is_ok_and(|page| page.uncompressed > *max_bytes)
+            && !parse_header(&bytes).is_ok_and(|page| page.uncompressed <= *max_bytes)
         {
             return Err(ParquetError::General(format!(
-                "the page at byte {start} states more bytes than the footer states of its column, {max_bytes}"
+                "the page at byte {start} is invalid, or states more bytes than the footer states of its column, {max_bytes}"
             )));
         }
         Ok(bytes)
@@ -202,7 +203,11 @@ fn parse_header(bytes: &[u8]) -> std::result::Result<PageSizes, HeaderError> {
         match (field, kind) {
             (2, CompactReader::I32) => uncompressed = Some(header.integer()?),
             (3, CompactReader::I32) => compressed = Some(header.integer()?),
-            _ => header.skip(kind, MAX_DEPTH)?,
+            // The other fields of the format; the library reads fields of other types differently.
+            (1 | 4, CompactReader::I32) | (5..=8, CompactReader::STRUCT) => {
+                header.skip(kind, MAX_DEPTH)?;
+            }
+            _ => return Err(HeaderError::Invalid),
         }
     }
     let size = |size: Option<i64>| {
@@ -272,10 +277,14 @@ impl CompactReader<'_> {
         if byte == 0 {
             return Ok(None);
         }
-        *field = match i64::from(byte >> 4) {
+        let number = match i64::from(byte >> 4) {
             0 => self.integer()?,
-            difference => field.checked_add(difference).ok_or(HeaderError::Invalid)?,
+            difference => *field + difference,
         };
+        if number <= *field || number > i64::from(i16::MAX) {
+            return Err(HeaderError::Invalid);
+        }
+        *field = number;
         Ok(Some(byte & 0x0f))
     }
 

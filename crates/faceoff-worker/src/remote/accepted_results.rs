@@ -32,8 +32,6 @@ const RETRY_AFTER: Duration = Duration::from_secs(5);
 const FILES_RETRY_AFTER: Duration = Duration::from_secs(1);
 /// Maximum number of results checked at a time; each check occupies a thread.
 const MAX_CONCURRENT_CHECKS: usize = 2;
-/// Longest wait of a check for its turn; then NATS delivers the result again later.
-const TURN_TIMEOUT: Duration = Duration::from_secs(30);
 /// Maximum number of pending results looked up in the stream at a time, since each lookup reads the whole message.
 const MAX_LOOKUPS: usize = 16;
 /// Maximum length of a worker's description of a platform fault, in characters.
@@ -280,10 +278,6 @@ impl Dispatcher {
         result: ResultMessage,
     ) -> anyhow::Result<Acceptance> {
         let nonce = result.lease.nonce;
-        let turn = tokio::time::timeout(TURN_TIMEOUT, self.unfinished_checks.turn(nonce));
-        let _turn = turn
-            .await
-            .context("another check takes long; the result is checked later")??;
         if self.unfinished_checks.begin(nonce)? == CheckStart::Refused {
             return Ok(Acceptance::Unchecked);
         }

@@ -3,7 +3,6 @@
 
 use anyhow::Context as _;
 use std::{fs, io, path::PathBuf};
-use tokio::sync::{RwLock, RwLockReadGuard, RwLockWriteGuard};
 use uuid::Uuid;
 
 /// A result is not checked again after this number of unfinished checks.
@@ -13,14 +12,6 @@ const MAX_UNFINISHED: u32 = 3;
 #[derive(Debug)]
 pub(super) struct UnfinishedChecks {
     folder: PathBuf,
-    turns: RwLock<()>,
-}
-
-/// The right to check a result, until it is dropped.
-#[derive(Debug)]
-pub(super) enum CheckTurn<'a> {
-    Shared(#[expect(dead_code, reason = "held until it is dropped")] RwLockReadGuard<'a, ()>),
-    Alone(#[expect(dead_code, reason = "held until it is dropped")] RwLockWriteGuard<'a, ()>),
 }
 
 /// Whether a check of a result may begin.
@@ -35,22 +26,7 @@ impl UnfinishedChecks {
     /// With a folder for the files; it is created.
     pub(super) fn open(folder: PathBuf) -> anyhow::Result<Self> {
         fs::create_dir_all(&folder).with_context(|| format!("creating {}", folder.display()))?;
-        Ok(Self {
-            folder,
-            turns: RwLock::default(),
-        })
-    }
-
-    /// Waits until a check of the result may begin: one with unfinished checks runs alone, since a check beside it that ends the
-    /// process would make its number grow.
-    ///
-    /// # Errors
-    /// If a number cannot be read.
-    pub(super) async fn turn(&self, nonce: Uuid) -> io::Result<CheckTurn<'_>> {
-        if self.unfinished(nonce)? == 0 {
-            return Ok(CheckTurn::Shared(self.turns.read().await));
-        }
-        Ok(CheckTurn::Alone(self.turns.write().await))
+        Ok(Self { folder })
     }
 
     /// The number of unfinished checks. An unreadable number counts as none.
@@ -115,25 +91,5 @@ mod tests {
             assert_eq!(checks.begin(nonce).unwrap(), CheckStart::Begun);
             checks.finish(nonce);
         }
-    }
-
-    #[tokio::test]
-    async fn suspected_result_is_checked_alone() {
-        let folder = tempfile::tempdir().unwrap();
-        let checks = UnfinishedChecks::open(folder.path().to_owned()).unwrap();
-        let [suspect, first, second] = [1, 2, 3].map(Uuid::from_u128);
-        checks.begin(suspect).unwrap();
-        let others = [
-            checks.turn(first).await.unwrap(),
-            checks.turn(second).await.unwrap(),
-        ];
-        let mut alone = Box::pin(checks.turn(suspect));
-        assert!(futures::poll!(&mut alone).is_pending());
-        drop(others);
-        let alone = alone.await.unwrap();
-        let mut other = Box::pin(checks.turn(first));
-        assert!(futures::poll!(&mut other).is_pending());
-        drop(alone);
-        other.await.unwrap();
     }
 }

@@ -186,6 +186,15 @@ impl EvalCommand {
                 (named, self.mismatch_seed.unwrap_or(derived))
             })
             .collect();
+        for (index, (named, _)) in seeds.iter().enumerate() {
+            let is_repeated = seeds[..index]
+                .iter()
+                .any(|(other, _)| other.seed == named.seed);
+            ensure!(
+                !is_repeated,
+                "--seed: a seed is given twice; its episodes would count twice"
+            );
+        }
         for (_, mismatch_seed) in &seeds {
             config
                 .check_playable(*mismatch_seed)

@@ -115,7 +115,7 @@ fn page_larger_than_its_column_is_refused() {
     let refused = pages.get_bytes(start, usize::try_from(length).unwrap());
     let refused = refused.unwrap_err().to_string();
     assert!(
-        refused.contains("states more bytes than the footer"),
+        refused.contains("states more bytes than the footer states"),
         "{refused}"
     );
 }
@@ -136,15 +136,16 @@ fn cut_headers_are_incomplete_or_invalid() {
     }
     for (bytes, error) in [
         (&[0][..], HeaderError::Invalid),
-        // A list that states more elements than there are bytes.
+        // A second size, by another number or type.
+        (
+            &[0x25, 0x02, 0x15, 0x02, 0x05, 0x04, 0x7e, 0x00],
+            HeaderError::Invalid,
+        ),
+        (&[0x26, 0x02, 0x15, 0x02, 0x00], HeaderError::Invalid),
+        // A list, which the format has not here.
         (
             &[0x19, 0xfc, 0xff, 0xff, 0xff, 0xff, 0x0f],
-            HeaderError::Incomplete,
-        ),
-        // A text that states more bytes than there are.
-        (
-            &[0x18, 0xff, 0xff, 0xff, 0xff, 0x0f],
-            HeaderError::Incomplete,
+            HeaderError::Invalid,
         ),
         // A number without an end.
         (
@@ -154,7 +155,7 @@ fn cut_headers_are_incomplete_or_invalid() {
             HeaderError::Invalid,
         ),
         // A structure in a structure in a structure, and so on.
-        (&[0x1c; 64], HeaderError::Invalid),
+        (&[0x5c; 64], HeaderError::Invalid),
         // A negative size.
         (&[0x25, 0x01, 0x15, 0x02, 0x00], HeaderError::Invalid),
     ] {

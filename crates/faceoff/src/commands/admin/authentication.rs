@@ -23,7 +23,7 @@ use std::{
 /// 3. the token of `faceoff login` to this server,
 /// 4. the host's token in the configured data folder, if the server runs on this machine.
 ///
-/// Without an option, a variable and a login, the server is the one that `faceoff.toml` in the working folder configures.
+/// Without an option, a variable and a login, the server is the one of this machine that `faceoff.toml` in the working folder configures.
 ///
 /// The host's token is sent to another machine only if `--data-dir` names its folder.
 pub(super) fn admin_client(
@@ -34,8 +34,12 @@ pub(super) fn admin_client(
 ) -> anyhow::Result<Client> {
     let explicit_token = token.map(|token| (token, "FACEOFF_ADMIN_TOKEN"));
     let mut connection = Connection::resolve(server, explicit_token, ca_file)?;
-    if connection.server_source == Source::Default {
-        connection.server = configured_server(Config::load(None)?.server.listen);
+    if connection.server_source == Source::Default && token.is_none() {
+        let configured = configured_server(Config::load(None)?.server.listen);
+        // A token must not go to another machine because of a file in the working folder.
+        if is_local(&configured) {
+            connection = Connection::resolve(Some(&configured), None, ca_file)?;
+        }
     }
     let has_token = token.is_some() || (data_dir.is_none() && connection.token.is_some());
     if !has_token {

@@ -67,6 +67,8 @@ struct Pool {
     stop: AtomicBool,
     /// The agent has answered something.
     has_answered: AtomicBool,
+    /// The run was stopped because the agent had answered nothing.
+    was_silent: AtomicBool,
     /// The kinds of the faults that were printed.
     printed: Mutex<Vec<AgentFaultKind>>,
     bar: ProgressBar,
@@ -100,6 +102,7 @@ pub(super) fn run_shards(
         max_faults,
         stop: AtomicBool::new(false),
         has_answered: AtomicBool::new(false),
+        was_silent: AtomicBool::new(false),
         printed: Mutex::default(),
         bar,
         notes,
@@ -145,7 +148,7 @@ pub(super) fn run_shards(
     let order = |task: Task| tasks.iter().position(|other| *other == task);
     faults.sort_by_key(|fault| (order(fault.agent_task.name()), fault.episode));
     let logs = into_inner(pool.logs);
-    if !pool.has_answered.load(Ordering::Relaxed)
+    if pool.was_silent.load(Ordering::Relaxed)
         && let Some(position) = faults.iter().position(is_silent_start)
     {
         let fault = faults.swap_remove(position);
@@ -232,6 +235,7 @@ impl Observer for PoolObserver<'_> {
             lock(&self.0.faults).push(fault.clone());
             // Every other start would be as silent.
             if is_silent_start(fault) && !self.0.has_answered.load(Ordering::Relaxed) {
+                self.0.was_silent.store(true, Ordering::Relaxed);
                 self.0.stop.store(true, Ordering::Relaxed);
             }
             if self.0.fault_count.fetch_add(1, Ordering::Relaxed) >= self.0.max_faults {
