@@ -2,11 +2,12 @@
 //! evaluation of another team, the honest team, gets its undisturbed result. A *bundle* is the archive with a team's agent.
 
 use crate::{
-    Team,
+    Team, commands,
     reference_result::{CONFIG, assert_undisturbed},
 };
 use faceoff_tests::{
     bundle::{pack, python_agent, python_bundle},
+    relay::{ConnectionBreaks, Relay},
     repository,
     server::{Server, TIMEOUT},
 };
@@ -458,4 +459,48 @@ fn upload_quota_is_per_team_and_reported_in_bytes() {
         let verdict = other.verdict(&server, &id);
         assert_eq!(verdict["state"], "valid", "{verdict:#}");
     }
+}
+
+/// The program, given the address of a relay in place of the server's.
+fn submit_through(relay: &Relay, token: &str, bundle: &Path) -> commands::CommandOutput {
+    let address = format!("http://{}", relay.address());
+    let bundle = bundle.to_str().expect("a scratch path is text");
+    let args = [
+        "submit", "--server", &address, "--token", token, "--json", bundle,
+    ];
+    commands::faceoff(&args, "")
+}
+
+#[test]
+fn submit_goes_on_after_broken_connections() {
+    const BUNDLE_BYTES: usize = 2 << 20;
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let data_dir = scratch.path().join("data");
+    let server = Server::start(&data_dir, CONFIG);
+    let team = Team::create(&server, "Alpha");
+    let agent = python_bundle(scratch.path(), "agent", &python_agent("say(hold)"));
+    let mut noise = vec![0; BUNDLE_BYTES];
+    let mut generator = blake3::Hasher::new().finalize_xof();
+    generator.fill(&mut noise);
+    fs::write(agent.join("weights"), noise).expect("a scratch file can be written");
+    let relay = Relay::start();
+    relay.set_target(server.address().into());
+    relay.set_breaks(ConnectionBreaks {
+        seed: 1,
+        refused_percent: 10,
+        max_bytes: 1 << 20,
+    });
+    let submission = submit_through(&relay, &team.token, &agent).json();
+    assert_eq!(submission["state"], "valid", "{submission:#}");
+    assert!(
+        relay.broken_connections() >= 3,
+        "the test breaks some connections"
+    );
+    let list: Value = server
+        .get("/api/v1/submissions", Some(&team.token))
+        .json()
+        .expect("the API speaks JSON");
+    assert_eq!(list.as_array().map(Vec::len), Some(1), "{list:#}");
+    assert_eq!(list[0]["blake3"], submission["blake3"]);
+    assert_eq!(count_files(&data_dir.join("uploads")), 0);
 }

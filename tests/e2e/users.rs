@@ -8,9 +8,18 @@ use crate::{
         join_args, member,
     },
 };
-use faceoff_tests::server::{Server, http};
+use faceoff_tests::{
+    program,
+    server::{Server, http},
+};
 use serde_json::{Value, json};
-use std::{fs, os::unix::fs::PermissionsExt, path::Path};
+use std::{
+    fs,
+    io::Write as _,
+    os::unix::fs::PermissionsExt,
+    path::Path,
+    process::{Command, Stdio},
+};
 
 const UNKNOWN_ID: &str = "00000000-0000-7000-8000-000000000000";
 
@@ -43,6 +52,81 @@ pub fn invite_and_join(server: &Server, invite_args: &[&str], name: &str) -> Str
         &join(server, &link, &["--name", name]).expect_success(),
         "fo_person_",
     )
+}
+
+/// Runs a command at a terminal of its own, and types a line at each prompt.
+const TYPIST: &str = r#"
+import os, pty, sys
+
+answers = sys.stdin.read().splitlines()
+child, terminal = pty.fork()
+if child == 0:
+    os.execv(sys.argv[1], sys.argv[1:])
+output = b""
+while True:
+    try:
+        chunk = os.read(terminal, 4096)
+    except OSError:
+        break
+    output += chunk
+    if output.rstrip().endswith(b"):") or output.rstrip().endswith(b"password:"):
+        os.write(terminal, answers.pop(0).encode() + b"\n")
+        output += b"\n."
+print(output.decode())
+sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+"#;
+
+/// `faceoff join` at a terminal, where the user types these lines.
+fn join_at_terminal(link: &str, name: &str, lines: &str) -> (bool, String) {
+    let mut child = Command::new("python3")
+        .args(["-c", TYPIST])
+        .arg(program("faceoff"))
+        .args(["join", link, "--name", name])
+        .env("XDG_CONFIG_HOME", "/nonexistent")
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("Python is installed");
+    let mut input = child.stdin.take().expect("it is a pipe");
+    input.write_all(lines.as_bytes()).expect("it reads");
+    drop(input);
+    let output = child.wait_with_output().expect("it ends");
+    let text = String::from_utf8(output.stdout).expect("it prints text");
+    (output.status.success(), text)
+}
+
+#[test]
+fn join_asks_for_a_password_at_the_terminal() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let server = Server::start(&scratch.path().join("data"), CONFIG);
+    let invite = |name: &str| {
+        let invited = admin(&server, &["people", "invite-organiser", name]).expect_success();
+        find_word(&invited, "/join/fo_invite_")
+    };
+    let sign_in = |name: &str, password: &str| {
+        let url = format!("{}/api/v1/sessions", server.url);
+        let body = json!({ "name": name, "password": password });
+        let request = http().build().expect("it needs nothing");
+        let answer = request.post(url).json(&body).send().expect("it answers");
+        answer.status().as_u16()
+    };
+    let link = invite("Grace");
+    let (is_done, text) = join_at_terminal(&link, "Grace", "a good password\nanother one\n");
+    assert!(!is_done && text.contains("can still be used"), "{text}");
+    // A mail program has put the link into angle brackets.
+    let quoted = format!("<{link}>.");
+    let (is_done, text) = join_at_terminal(&quoted, "Grace", "a good password\na good password\n");
+    assert!(is_done && text.contains("fo_person_"), "{text}");
+    assert!(!text.contains("a good password"), "it is not shown: {text}");
+    assert_eq!(sign_in("Grace", "a good password"), 201);
+    // The accent as macOS types it, upper case, and a space from copying.
+    let (is_done, text) =
+        join_at_terminal(&invite("Zoë"), "Zoë", "a good password\na good password\n");
+    assert!(is_done, "{text}");
+    assert_eq!(sign_in(" ZOE\u{308}", "a good password"), 201);
+    let (is_done, text) = join_at_terminal(&invite("Ada"), "Ada", "\n");
+    assert!(is_done && text.contains("fo_person_"), "{text}");
+    assert_eq!(sign_in("Ada", ""), 401);
 }
 
 #[test]

@@ -7,6 +7,7 @@
 #![warn(missing_docs)]
 
 pub mod objects_only;
+pub mod pasted;
 pub mod paths;
 pub mod requests;
 pub mod token;

@@ -36,7 +36,7 @@ use utoipa::{
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewTeam {
-    /// 1 to 40 characters: letters, digits, spaces and . _ -
+    /// 1 to 40 letters and digits of any script, spaces and . _ - ' & + ·
     pub name: String,
 }
 

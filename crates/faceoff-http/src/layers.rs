@@ -175,7 +175,7 @@ fn request_cost(path: &str) -> NonZeroU32 {
     }
 }
 
-/// Answers `TooManyRequests` to an address that exceeds its rate limit.
+/// Answers `TooManyRequests` to an address, or to a signed-in caller, that exceeds its rate limit.
 async fn limit_rate(
     State(app): State<Arc<AppState>>,
     mut request: Request,
@@ -186,7 +186,9 @@ async fn limit_rate(
     let checked = match client {
         Some(address) => {
             let cost = request_cost(request.uri().path());
-            app.request_limiter.check_address(address, cost)
+            let network = Network::from_address(address);
+            let source = app.request_source(request.headers(), network);
+            app.request_limiter.check_source(&source, cost)
         }
         None => Ok(()),
     };

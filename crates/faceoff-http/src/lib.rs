@@ -21,9 +21,11 @@ pub use capacity_monitor::{CapacityMonitor, CapacityWarning};
 pub use faceoff_service::{
     agent_resources::{AgentResources, InventoryPublisher},
     config::{Capacity, HttpConfig, HttpLimits},
+    download::{Download, DownloadContent, Downloads},
     link_key::LinkKey,
     problem,
     rate_limits::{RateLimit, RateLimits},
+    services::partial_uploads::PARTIAL_UPLOADS_FOLDER,
     transfer_rate::MinTransferRate,
 };
 pub use proxies::ProxyNetwork;

@@ -8,8 +8,8 @@ use faceoff_api::views::ablation::AblationStatus;
 use faceoff_replay::EpisodeLine;
 use faceoff_service::{
     app::App,
-    csv::{Table, escape_formula, or_empty},
-    extract::PathParam,
+    csv::{CsvQuery, Table, escape_formula, or_empty},
+    extract::{PathParam, QueryParams},
     problem::Problem,
     viewer::Viewer,
     views::{ablation, clips::Clips, visibility::Visibility},
@@ -23,6 +23,7 @@ pub(super) async fn episodes(
     viewer: Result<Viewer, Problem>,
     State(app): State<App>,
     id: Result<PathParam<EvaluationId>, Problem>,
+    query: Result<QueryParams<CsvQuery>, Problem>,
 ) -> CsvResponse {
     let PathParam(id) = id?;
     let visibility = Visibility::load(&app, viewer?).await?;
@@ -73,7 +74,7 @@ pub(super) async fn episodes(
         }
         table.row(row);
     }
-    Ok(table.into_download("episodes.csv"))
+    Ok(table.into_download("episodes.csv", query?.0.format))
 }
 
 /// `/evaluations/{id}/answer-times.csv`: number of control steps by answer time, for viewers of the dataset.
@@ -81,6 +82,7 @@ pub(super) async fn answer_times(
     viewer: Result<Viewer, Problem>,
     State(app): State<App>,
     id: Result<PathParam<EvaluationId>, Problem>,
+    query: Result<QueryParams<CsvQuery>, Problem>,
 ) -> CsvResponse {
     let PathParam(id) = id?;
     let viewer = viewer?;
@@ -101,13 +103,14 @@ pub(super) async fn answer_times(
             ]);
         }
     }
-    Ok(table.into_download("answer-times.csv"))
+    Ok(table.into_download("answer-times.csv", query?.0.format))
 }
 
 /// `/submissions/{id}/ablation.csv`: a line per task and profile.
 pub(super) async fn ablation(
     State(app): State<App>,
     id: Result<PathParam<SubmissionId>, Problem>,
+    query: Result<QueryParams<CsvQuery>, Problem>,
 ) -> CsvResponse {
     let PathParam(id) = id?;
     let view = ablation::newest(&app, id).await?;
@@ -146,5 +149,5 @@ pub(super) async fn ablation(
             ]);
         }
     }
-    Ok(table.into_download("ablation.csv"))
+    Ok(table.into_download("ablation.csv", query?.0.format))
 }

@@ -11,6 +11,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use faceoff_api::{
+    pasted::secret_in,
     requests::{FoundedTeam, JoinRequest},
     token::hash_token,
     views::announcement::TermsView,
@@ -118,7 +119,10 @@ async fn page_with(
     error: Option<String>,
 ) -> Result<Response, PageProblem> {
     let now = app.config.clock.now();
-    let found = app.store.code_status(hash_token(code), now).await;
+    let found = app
+        .store
+        .code_status(hash_token(secret_in(code)), now)
+        .await;
     let offer = match found? {
         CodeStatus::Open(invitation, team) => match invitation.role {
             InvitationRole::Organiser => Offer::Organiser,

@@ -16,6 +16,7 @@ mod csv_downloads;
 mod dashboard;
 mod dashboard_frame;
 mod docs;
+mod downloads;
 mod embeddable;
 mod episode_text;
 mod episodes;
@@ -110,6 +111,8 @@ pub fn router(time_limit: Duration, api: Arc<Value>) -> Router<App> {
             get(ablation::pair::page),
         )
         .route("/help", get(help::page))
+        .route("/downloads", get(downloads::page))
+        .route("/downloads/{name}", get(downloads::file))
         .route("/problems", get(problems::page))
         .route("/announcements", get(announcements::page))
         .route("/sign-in", get(sign_in::page).post(sign_in::submit))

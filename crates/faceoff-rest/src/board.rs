@@ -14,7 +14,7 @@ use faceoff_api::{
 use faceoff_service::{
     accept::wants_csv,
     app::App,
-    csv::MEDIA_TYPE,
+    csv::{CsvFormat, MEDIA_TYPE, Table},
     extract::{PathParam, QueryParams},
     problem::Problem,
     request_preconditions::{ETag, RequestPreconditions},
@@ -148,17 +148,18 @@ async fn send<T: Serialize>(
     conditions: &RequestPreconditions,
     format: BoardFormat,
     view: impl Future<Output = Result<T, Problem>>,
-    csv: impl FnOnce(&T) -> Vec<u8>,
+    table: impl FnOnce(&T) -> Table,
 ) -> Result<Response, Problem> {
     let response = async {
         let view = view.await?;
-        Ok(match format {
-            BoardFormat::Json => Json(view).into_response(),
-            BoardFormat::Csv => {
-                let media_type = [(header::CONTENT_TYPE, MEDIA_TYPE)];
-                (media_type, csv(&view)).into_response()
-            }
-        })
+        let csv_format = match format {
+            BoardFormat::Json => return Ok(Json(view).into_response()),
+            BoardFormat::Csv => CsvFormat::Csv,
+            BoardFormat::Spreadsheet => CsvFormat::Spreadsheet,
+            BoardFormat::SpreadsheetComma => CsvFormat::SpreadsheetComma,
+        };
+        let media_type = [(header::CONTENT_TYPE, MEDIA_TYPE)];
+        Ok((media_type, table(&view).into_bytes(csv_format)).into_response())
     };
     let mut response = send_tagged(tag, conditions, response).await?;
     let request_headers = HeaderValue::from_static("authorization, cookie, accept");

@@ -121,7 +121,7 @@ macro_rules! common_fields {
 }
 
 /// The ranked rows, then the baselines.
-pub(crate) fn board_table(competition: &Competition, board: &BoardView) -> Vec<u8> {
+pub(crate) fn board_table(competition: &Competition, board: &BoardView) -> Table {
     let mut columns = vec!["rank", "rank_group", "baseline", "would_rank"];
     columns.extend(tier_fields(
         competition,
@@ -168,11 +168,11 @@ pub(crate) fn board_table(competition: &Competition, board: &BoardView) -> Vec<u
         ];
         table.row(rank.into_iter().chain(common_fields!(competition, row, "")));
     }
-    table.into_bytes()
+    table
 }
 
 /// One line per team and day.
-pub(crate) fn history_table(competition: &Competition, history: &HistoryView) -> Vec<u8> {
+pub(crate) fn history_table(competition: &Competition, history: &HistoryView) -> Table {
     let mut columns = vec![
         "day",
         "team",
@@ -217,17 +217,18 @@ pub(crate) fn history_table(competition: &Competition, history: &HistoryView) ->
                 .chain(task_fields),
         );
     }
-    table.into_bytes()
+    table
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use faceoff_service::csv::CsvFormat;
     use serde_json::json;
 
     /// Headings and fields of a table's only row.
-    fn columns(table: Vec<u8>) -> Vec<(String, String)> {
-        let text = String::from_utf8(table).unwrap();
+    fn columns(table: Table) -> Vec<(String, String)> {
+        let text = String::from_utf8(table.into_bytes(CsvFormat::Csv)).unwrap();
         let lines: Vec<Vec<String>> = text
             .lines()
             .map(|line| line.split(',').map(str::to_owned).collect())

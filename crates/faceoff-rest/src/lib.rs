@@ -36,6 +36,7 @@ mod live_game;
 mod live_reader;
 mod me;
 mod paging;
+mod partial_uploads;
 mod proposals;
 mod ratings;
 mod registrations;
@@ -91,6 +92,11 @@ pub fn router(timeout: Duration, competition: &Competition) -> (Router<App>, Arc
     // An upload may take any time as long as it progresses; `upload` itself limits its size and its pauses.
     let uploads = OpenApiRouter::new()
         .routes(routes!(upload::create_submission))
+        .routes(routes!(
+            partial_uploads::partial_upload,
+            partial_uploads::add_part,
+            partial_uploads::remove_upload
+        ))
         .layer(DefaultBodyLimit::disable());
     // Archives have no time limit, because the time to make one is not known in advance.
     let archives = OpenApiRouter::new().routes(routes!(season_archive::season_archive));

@@ -1,6 +1,6 @@
 //! Uploading submissions. The uploaded file is the *bundle*: an archive with the agent, or a container image.
 
-use super::document::Binary;
+use super::{document::Binary, partial_uploads::parse_hash};
 use axum::{
     Json,
     body::Body,
@@ -14,9 +14,10 @@ use faceoff_service::{
     auth::TeamCaller,
     extract::QueryParams,
     problem::{Problem, ProblemKind},
-    services::uploads::{IncomingBundle, upload},
+    services::uploads::{BundleSource, IncomingBundle, upload},
     views::submission,
 };
+use faceoff_types::{IdempotencyKey, InvalidIdempotencyKey};
 use serde::Deserialize;
 use utoipa::IntoParams;
 
@@ -26,10 +27,15 @@ use utoipa::IntoParams;
 pub(crate) struct UploadQuery {
     /// File name of the bundle, e.g. `striker.tar.gz`; shown with the submission.
     file_name: Option<String>,
+    /// Takes the bundle with this BLAKE3 hash that was uploaded in parts (PATCH /api/v1/uploads/HASH). The request then has no body.
+    upload: Option<String>,
 }
 
 /// Header with the bundle's file name, for clients that cannot set a query.
 const FILE_NAME: HeaderName = HeaderName::from_static("x-file-name");
+
+/// Header with which an upload can be sent again without creating a second submission.
+const IDEMPOTENCY_KEY: HeaderName = HeaderName::from_static("idempotency-key");
 
 /// Accepted media types of bundles; the header may also be left out.
 const BUNDLE_TYPES: [&str; 8] = [
@@ -46,11 +52,15 @@ const BUNDLE_TYPES: [&str; 8] = [
 /// Uploads a bundle. The request body is the bundle itself (.tar.gz, .tar.zst, .zip, or .tar of a container image).
 ///
 /// It is unpacked and checked in a validation run; poll the submission until its state is `valid` or `invalid`.
+///
+/// With a header `Idempotency-Key` the request can be sent again after a broken connection: a second upload of the same bundle with the same
+/// key returns the submission of the first one.
 #[utoipa::path(
     post, path = "/submissions", tag = "team", security(("team" = [])),
     params(
         UploadQuery,
         ("X-File-Name" = Option<String>, Header, description = "file name of the bundle, as an alternative to the query parameter", example = "striker.tar.gz"),
+        ("Idempotency-Key" = Option<String>, Header, description = "1 to 100 visible ASCII characters that the client has chosen for this upload", example = "7f0c4a7e-3f5e-4c1b-9d7e-0a5f5f1d2c3b"),
     ),
     request_body(
         description = "the bundle itself",
@@ -68,9 +78,11 @@ const BUNDLE_TYPES: [&str; 8] = [
     responses(
         (status = 201, body = SubmissionView, headers(("Location" = String, description = "path of the submission"))),
         (status = 408, description = "the upload stalled, or was too slow"),
-        (status = 409, description = "the season is closed, or the team's storage is full"),
+        (status = 404, description = "no part of the bundle has arrived"),
+        (status = 409, description = "the season is closed, the team's storage is full, or parts of the bundle are missing"),
         (status = 413, description = "larger than `max_bundle_bytes`"),
         (status = 415, description = "not a supported bundle format"),
+        (status = 422, description = "the key was used for another bundle"),
         (status = 429, description = "too many uploads are running, too many submissions wait for their validation run, or the daily quota is used up"),
         (status = 507, description = "the server's disk has too little free space"),
     )
@@ -82,22 +94,44 @@ pub(crate) async fn create_submission(
     headers: HeaderMap,
     body: Body,
 ) -> Result<impl IntoResponse, Problem> {
-    check_media_type(&headers)?;
     let claimed_name = query
         .file_name
         .or_else(|| Some(headers.get(FILE_NAME)?.to_str().ok()?.to_owned()))
         .unwrap_or_default();
-    let content_length = headers.get(header::CONTENT_LENGTH);
+    let source = match query.upload {
+        Some(hash) => BundleSource::Parts(parse_hash(&hash)?),
+        None => {
+            check_media_type(&headers)?;
+            let content_length = headers.get(header::CONTENT_LENGTH);
+            BundleSource::Body {
+                bytes: content_length.and_then(|value| value.to_str().ok()?.parse().ok()),
+                body,
+            }
+        }
+    };
     let incoming = IncomingBundle {
-        bytes: content_length.and_then(|value| value.to_str().ok()?.parse().ok()),
         claimed_name,
-        body,
+        key: idempotency_key(&headers)?,
+        source,
     };
     let submission = upload(&app, &caller, incoming).await?;
     let location = [(header::LOCATION, paths::submission(submission.id))];
     let now = app.config.clock.now();
     let view = submission::view(submission, None, &[], now);
     Ok((StatusCode::CREATED, AppendHeaders(location), Json(view)))
+}
+
+fn idempotency_key(headers: &HeaderMap) -> Result<Option<IdempotencyKey>, Problem> {
+    let Some(value) = headers.get(IDEMPOTENCY_KEY) else {
+        return Ok(None);
+    };
+    let parsed = String::from_utf8_lossy(value.as_bytes()).parse();
+    parsed.map(Some).map_err(|error: InvalidIdempotencyKey| {
+        Problem::new(
+            ProblemKind::InvalidRequest,
+            format!("the header Idempotency-Key: {error}"),
+        )
+    })
 }
 
 fn check_media_type(headers: &HeaderMap) -> Result<(), Problem> {

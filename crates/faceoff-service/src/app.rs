@@ -6,10 +6,12 @@ use crate::{
     change_quota::ChangeQuota,
     config::HttpConfig,
     credential,
+    network::Network,
+    partial_uploads::PartialUploads,
     passwords::Passwords,
     places::{Places, Precedence},
     problem::Problem,
-    rate_limits::RequestLimiter,
+    rate_limits::{RequestLimiter, RequestSource},
     recent_callers::RecentCallers,
     shared_cache::SharedCache,
     summaries::Summaries,
@@ -39,6 +41,8 @@ pub struct AppState {
     pub config: HttpConfig,
     /// Limits the concurrent uploads of each team.
     pub upload_slots: Arc<UploadSlots>,
+    /// The uploads in parts that are being received.
+    pub(crate) partial_uploads: Arc<PartialUploads>,
     /// One permit per upload that is being copied into the artifacts.
     pub artifact_writes: Semaphore,
     /// One permit: only one season archive is made and sent at a time.
@@ -103,6 +107,7 @@ impl AppState {
     pub fn new(store: Store, live: LiveState, config: HttpConfig) -> Self {
         Self {
             upload_slots: Arc::new(UploadSlots::new(config.limits.team_uploads)),
+            partial_uploads: Arc::default(),
             artifact_writes: Semaphore::new(MAX_ARTIFACT_WRITES),
             archive_permit: Arc::new(Semaphore::new(1)),
             summaries: Summaries::new(store.clone(), Arc::clone(config.competition())),
@@ -159,6 +164,13 @@ impl AppState {
         let hash = credential::secret_hash(&self.config, headers);
         let caller = hash.and_then(|hash| self.recent_callers.find(&hash));
         caller.unwrap_or(Precedence::Visitor)
+    }
+
+    /// Whose requests this one is counted with: the caller's if the token was verified recently, else those of its address.
+    pub fn request_source(&self, headers: &HeaderMap, network: Network) -> RequestSource {
+        credential::secret_hash(&self.config, headers)
+            .filter(|hash| self.recent_callers.find(hash).is_some())
+            .map_or(RequestSource::Network(network), RequestSource::Caller)
     }
 
     /// Counts a request with a token.

@@ -1,8 +1,8 @@
 //! Configuration of the web server: limits, addresses, keys, and what it shows about the machines that run jobs.
 
 use crate::{
-    agent_resources::AgentResources, link_key::LinkKey, rate_limits::RateLimits,
-    transfer_rate::MinTransferRate,
+    agent_resources::AgentResources, download::Downloads, link_key::LinkKey,
+    rate_limits::RateLimits, transfer_rate::MinTransferRate,
 };
 use faceoff_episode::Simulator;
 use faceoff_metrics::{Metrics, Process};
@@ -41,7 +41,7 @@ impl Default for HttpLimits {
             event_readers: 512,
             request_timeout: Duration::from_secs(30),
             min_upload_rate: MinTransferRate {
-                bytes_per_s: 16 << 10,
+                bytes_per_s: 1 << 10,
                 grace: Duration::from_secs(30),
             },
             pending_submissions: 5,
@@ -73,6 +73,10 @@ pub struct HttpConfig {
     /// The server's public URL without a trailing slash. Links begin with it; if it begins with https, cookies are sent
     /// over TLS only. `None`: links are paths.
     pub public_url: Option<String>,
+    /// Files that visitors can download to develop agents.
+    pub downloads: Arc<Downloads>,
+    /// Address of the server's source code.
+    pub source_url: Option<String>,
     /// Existing folder for unfinished uploads, on a disk with space for some bundles.
     pub upload_dir: PathBuf,
     /// Source of the current time: tests set it.

@@ -6,7 +6,7 @@ use crate::{
     session,
 };
 use axum::http::{HeaderMap, HeaderValue, header, request::Parts};
-use faceoff_api::token::hash_token;
+use faceoff_api::{pasted::secret_in, token::hash_token};
 
 /// The credential of a request: an API token, or the secret of a browser's session.
 pub(crate) enum Credential<'a> {
@@ -55,9 +55,13 @@ pub fn sealed_grant(headers: &HeaderMap) -> Option<&str> {
     value.to_str().ok()?.strip_prefix("Grant ")
 }
 
-/// The token of a header `Authorization: Bearer TOKEN`; `None` if it has another form.
+/// The token of a header `Authorization: Bearer TOKEN`; `None` if it has another form. The token may be quoted, and alone.
 fn bearer_token(value: &HeaderValue) -> Option<&str> {
-    let (scheme, token) = value.to_str().ok()?.split_once(' ')?;
-    let token = token.trim();
-    (scheme.eq_ignore_ascii_case("bearer") && !token.is_empty()).then_some(token)
+    let text = value.to_str().ok()?.trim();
+    let token = match text.split_once(' ') {
+        Some((scheme, token)) if scheme.eq_ignore_ascii_case("bearer") => secret_in(token),
+        None if secret_in(text).starts_with("fo_") => secret_in(text),
+        _ => return None,
+    };
+    (!token.is_empty()).then_some(token)
 }

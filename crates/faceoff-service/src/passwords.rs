@@ -13,7 +13,7 @@ use argon2::{
     Argon2,
     password_hash::{PasswordHasher, PasswordVerifier, phc::PasswordHash},
 };
-use faceoff_types::UserId;
+use faceoff_types::{UserId, name_skeleton};
 use jiff::{SignedDuration, Timestamp};
 use std::{
     collections::HashMap,
@@ -53,13 +53,13 @@ pub struct Passwords {
     failures: Mutex<HashMap<NameKey, Failures>>,
 }
 
-/// A hash of a name to sign in with, which is unique regardless of case. Names can be as long as a request.
+/// A hash of a name to sign in with, the same for names that look alike. Names can be as long as a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 struct NameKey([u8; 32]);
 
 impl NameKey {
     fn new(name: &str) -> Self {
-        Self(*blake3::hash(name.trim().to_ascii_lowercase().as_bytes()).as_bytes())
+        Self(*blake3::hash(name_skeleton(name).as_bytes()).as_bytes())
     }
 }
 

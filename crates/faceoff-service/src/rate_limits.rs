@@ -11,7 +11,6 @@ use governor::{
 };
 use std::{
     hash::Hash,
-    net::IpAddr,
     num::NonZeroU32,
     sync::atomic::{AtomicU32, Ordering},
 };
@@ -28,7 +27,8 @@ pub struct RateLimit {
 /// The rate limits of the server; `None`: unlimited.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct RateLimits {
-    /// Per IPv4 address or IPv6 network of 64 bits. The address of a trusted proxy is not limited.
+    /// Per IPv4 address or IPv6 network of 64 bits, and as much for each caller there whose token was verified recently: a class shares
+    /// an address. The address of a trusted proxy is not limited.
     pub address: Option<RateLimit>,
     /// Per token or session, from any address.
     pub token: Option<RateLimit>,
@@ -39,10 +39,18 @@ pub struct RateLimits {
 /// Number of requests after which clients without recent requests are removed from memory.
 const CLEANUP_INTERVAL: u32 = 4096;
 
+/// Whose requests are counted together, before the request is authenticated.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub enum RequestSource {
+    Network(Network),
+    /// The hash of a secret that was verified recently.
+    Caller([u8; 32]),
+}
+
 /// Counts recent requests by network and by token.
 #[derive(Debug)]
 pub struct RequestLimiter {
-    addresses: Option<KeyedLimiter<Network>>,
+    sources: Option<KeyedLimiter<RequestSource>>,
     tokens: Option<KeyedLimiter<TokenId>>,
 }
 
@@ -50,18 +58,22 @@ impl RequestLimiter {
     /// A limiter without recorded requests.
     pub fn new(limits: RateLimits) -> Self {
         Self {
-            addresses: limits.address.map(KeyedLimiter::new),
+            sources: limits.address.map(KeyedLimiter::new),
             tokens: limits.token.map(KeyedLimiter::new),
         }
     }
 
-    /// Counts a request from an address, as `cost` requests.
+    /// Counts a request, as `cost` requests.
     ///
     /// # Errors
     /// [`ProblemKind::TooManyRequests`].
-    pub fn check_address(&self, address: IpAddr, cost: NonZeroU32) -> Result<(), Problem> {
-        match &self.addresses {
-            Some(limiter) => limiter.check(&Network::from_address(address), cost, "an address"),
+    pub fn check_source(&self, source: &RequestSource, cost: NonZeroU32) -> Result<(), Problem> {
+        let name = match source {
+            RequestSource::Network(_) => "an address",
+            RequestSource::Caller(_) => "a signed-in caller",
+        };
+        match &self.sources {
+            Some(limiter) => limiter.check(source, cost, name),
             None => Ok(()),
         }
     }
@@ -126,6 +138,10 @@ impl<K: Hash + Eq + Clone> KeyedLimiter<K> {
 mod tests {
     use super::*;
 
+    fn network(address: &str) -> RequestSource {
+        RequestSource::Network(Network::from_address(address.parse().unwrap()))
+    }
+
     #[test]
     fn network_shares_one_rate_limit() {
         let rate = RateLimit {
@@ -136,8 +152,7 @@ mod tests {
             address: Some(rate),
             ..RateLimits::default()
         });
-        let check =
-            |address: &str| limiter.check_address(address.parse().unwrap(), NonZeroU32::MIN);
+        let check = |address: &str| limiter.check_source(&network(address), NonZeroU32::MIN);
         // The loop takes much less than the thousand seconds after which a burst is available again.
         let refused = (0..1500).filter(|_| check("2001:db8::1").is_err()).count();
         assert!((1..=500).contains(&refused), "{refused}");
@@ -149,8 +164,8 @@ mod tests {
         // A costly request counts as several, and one that costs more than the burst can still be made.
         for (address, cost, expected) in [("192.0.2.2", 10, 50..=150), ("192.0.2.3", 5000, 1..=2)] {
             let cost = NonZeroU32::new(cost).unwrap();
-            let address = address.parse().unwrap();
-            let made = (0..1500).filter(|_| limiter.check_address(address, cost).is_ok());
+            let source = network(address);
+            let made = (0..1500).filter(|_| limiter.check_source(&source, cost).is_ok());
             let made = made.count();
             assert!(expected.contains(&made), "{address} made {made}");
         }

@@ -1,7 +1,7 @@
 //! [`StoreError`]: why an operation of the store failed.
 
 use crate::program::Program;
-use faceoff_types::is_full_disk;
+use faceoff_types::{SubmissionId, is_full_disk};
 use jiff::{Timestamp, civil::Date};
 use sqlx::{error::DatabaseError, migrate::MigrateError};
 use std::{error::Error, fmt::Display};
@@ -18,7 +18,7 @@ pub enum StoreError {
         /// When they were removed.
         at: Timestamp,
     },
-    /// Names that differ only in case count as the same.
+    /// Names that look alike count as the same; this is the existing one.
     #[error("a team named {0:?} exists already")]
     TeamNameTaken(String),
     /// The cutoff of the day, or of a later one, has passed.
@@ -75,6 +75,12 @@ pub enum StoreError {
     /// The invitation link is expired, used or revoked; the text says which.
     #[error("{0}")]
     InvitationInvalid(String),
+    /// The team has used an idempotency key for another bundle before.
+    #[error("the key was used for the submission {submission}, whose bundle is another one")]
+    KeyUsed {
+        /// The earlier submission.
+        submission: SubmissionId,
+    },
     /// The season is closed: it accepts no uploads and runs no evaluations.
     #[error("the season was closed at {closed_at}")]
     SeasonClosed { closed_at: Timestamp },

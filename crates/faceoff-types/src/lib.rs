@@ -19,6 +19,7 @@ mod full_disk;
 mod game;
 mod game_limits;
 mod game_seed_label;
+mod idempotency_key;
 mod ids;
 mod invalid_stage_rules;
 mod limits;
@@ -75,6 +76,7 @@ pub use full_disk::is_full_disk;
 pub use game::*;
 pub use game_limits::GameLimits;
 pub use game_seed_label::{GameSeedLabel, ParseGameSeedLabelError};
+pub use idempotency_key::{IdempotencyKey, InvalidIdempotencyKey};
 pub use ids::{
     AblationId, AnnouncementId, DeliveryId, EvaluationId, GameId, InvitationId, ParseIdError,
     ProposalId, QuestionId, RegistrationId, RunId, ShardId, StageId, SubmissionId, TeamId, TokenId,
@@ -85,7 +87,7 @@ pub use limits::{AgentLimits, BundleLimits, ResourceLimits, TimeLimits};
 pub use live_game::{GameEvent, LiveEvent, LiveGame, LivePosition};
 pub use magnitudes::{InvalidMagnitude, Magnitude, MagnitudeInfo, Magnitudes};
 pub use millionths::{Millionths, NotMillionths};
-pub use names::{DivisionName, InvalidName, StageName, TeamName, UserName};
+pub use names::{DivisionName, InvalidName, StageName, TeamName, UserName, name_skeleton};
 pub use outcome::{EpisodeEnd, EpisodeOutcome};
 pub use printable::{escape_unprintable, is_printable, printable_excerpt};
 pub use profile::{Profile, ProfileMap};

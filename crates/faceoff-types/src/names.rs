@@ -1,10 +1,19 @@
-//! Names that people choose for teams, stages, divisions and users, with the same rules for all.
+//! Names that people choose for teams, stages, divisions and users, in any script and with the same rules for all.
 
 use crate::is_printable;
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
+use unicode_normalization::{UnicodeNormalization, char::is_combining_mark};
+use unicode_security::confusable_detection::skeleton;
 
+/// Longest name, in characters without accents and other marks.
 const MAX_CHARS: usize = 40;
+
+/// More marks on one character cover the lines above and below it. No language writes so many.
+const MAX_MARKS: usize = 4;
+
+/// Signs that are part of names, beside letters and digits.
+const SIGNS: &str = " ._-'’&+·・";
 
 /// A text that cannot be the name of a team, stage, user or division.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -20,26 +29,79 @@ enum NameProblem {
     #[error("has 1 to {MAX_CHARS} characters, this one has {0}")]
     Length(usize),
     /// A character that pages could not show safely.
-    #[error("has letters, digits, spaces and . _ - only, not {0:?}")]
+    #[error("has letters and digits of any script, spaces and . _ - ' & + · only, not {0:?}")]
     Character(char),
+    #[error("has at most {MAX_MARKS} accents or other marks on a character")]
+    Marks,
     /// A leading or trailing space.
     #[error("neither starts nor ends with a space")]
     Space,
 }
 
 fn check(text: &str) -> Result<(), NameProblem> {
-    let chars = text.chars().count();
+    let chars = text.chars().filter(|c| !is_combining_mark(*c)).count();
     if !(1..=MAX_CHARS).contains(&chars) {
         return Err(NameProblem::Length(chars));
     }
-    let allowed = |c: &char| " ._-".contains(*c) || (c.is_alphanumeric() && is_printable(*c));
-    if let Some(character) = text.chars().find(|c| !allowed(c)) {
-        return Err(NameProblem::Character(character));
+    let mut marks = 0;
+    let mut previous = ' ';
+    let mut rest = text.chars().peekable();
+    while let Some(c) = rest.next() {
+        let is_allowed = if is_combining_mark(c) {
+            marks += 1;
+            previous != ' ' && is_printable(c)
+        } else if is_joiner(c) {
+            joins(previous) && rest.peek().is_some_and(|next| joins(*next))
+        } else {
+            marks = 0;
+            SIGNS.contains(c) || (c.is_alphanumeric() && is_printable(c))
+        };
+        if !is_allowed {
+            return Err(NameProblem::Character(c));
+        }
+        if marks > MAX_MARKS {
+            return Err(NameProblem::Marks);
+        }
+        previous = c;
     }
     if text.starts_with(' ') || text.ends_with(' ') {
         return Err(NameProblem::Space);
     }
     Ok(())
+}
+
+/// Invisible characters that decide how letters are joined: Persian and some Indian scripts need them.
+const fn is_joiner(c: char) -> bool {
+    matches!(c, '\u{200c}' | '\u{200d}')
+}
+
+/// Whether letters of this character's script can be joined.
+fn joins(c: char) -> bool {
+    // Arabic and Syriac; the scripts of India and its neighbours.
+    matches!(c, '\u{600}'..='\u{7ff}' | '\u{8a0}'..='\u{dff}') && is_printable(c)
+}
+
+/// The text as all systems write it: macOS, for example, splits “é” into a letter and an accent, and keyboards have other spaces.
+fn normalised(text: &str) -> String {
+    let is_space = |c| {
+        matches!(
+            c,
+            '\u{a0}' | '\u{2000}'..='\u{200a}' | '\u{202f}' | '\u{3000}'
+        )
+    };
+    let with_spaces = text.chars().map(|c| if is_space(c) { ' ' } else { c });
+    with_spaces.nfc().collect()
+}
+
+/// A text that is the same for names that look alike, as Unicode's list of confusable characters (UTS #39) knows them: letters of other
+/// scripts, upper case, 0 and O. It is not for display.
+#[must_use]
+pub fn name_skeleton(name: &str) -> String {
+    let plain: String = name.trim().nfkc().filter(|c| !is_joiner(*c)).collect();
+    // Upper and lower case of a letter may resemble different letters.
+    let lower = plain.to_lowercase();
+    let skeleton: String = skeleton(&lower).collect();
+    skeleton.to_lowercase()
 }
 
 macro_rules! name {
@@ -66,8 +128,9 @@ macro_rules! name {
         impl FromStr for $name {
             type Err = InvalidName;
             fn from_str(s: &str) -> Result<Self, InvalidName> {
-                check(s).map_err(|problem| InvalidName { kind: $kind, problem })?;
-                Ok(Self(s.to_owned()))
+                let name = normalised(s);
+                check(&name).map_err(|problem| InvalidName { kind: $kind, problem })?;
+                Ok(Self(name))
             }
         }
 
@@ -87,7 +150,7 @@ macro_rules! name {
 }
 
 name!(
-    /// A team's name as the board shows it: 1 to 40 characters, letters, digits, spaces and `. _ -`,
+    /// A team's name as the board shows it: 1 to 40 characters, letters and digits of any script, spaces and `. _ - ' & + ·`,
     /// without leading or trailing space.
     TeamName,
     "team"
@@ -113,15 +176,50 @@ mod tests {
     use super::*;
 
     #[test]
-    fn team_names_of_the_paper_are_valid() {
+    fn names_of_any_script_are_valid() {
         for name in [
             "AiRLIHockey",
             "Air-HocKIT",
             "RL3_polimi",
             "Kalash Jain",
             "Zoë",
+            "Håkon O'Brien & Søn",
+            "C++ Robots",
+            "हिन्दी रोबोट",
+            "می‌خواهم",
+            "チーム・ロボ",
+            "한국어 팀",
+            "ทีมหุ่นยนต์",
         ] {
             assert_eq!(name.parse::<TeamName>().map(String::from), Ok(name.into()));
+        }
+    }
+
+    #[test]
+    fn names_are_stored_in_one_form() {
+        let parsed = |text: &str| text.parse::<UserName>().unwrap().0;
+        assert_eq!(parsed("Zoe\u{308}"), "Zoë", "as macOS writes it");
+        assert_eq!(parsed("Kalash\u{a0}Jain"), "Kalash Jain");
+        // A letter that is stored as two characters: the stored name is valid, too.
+        let longest = "\u{958}".repeat(MAX_CHARS);
+        let stored = parsed(&longest);
+        assert_eq!(parsed(&stored), stored);
+    }
+
+    #[test]
+    fn names_that_look_alike_have_the_same_skeleton() {
+        for (name, other) in [
+            ("AiRLIHockey", "airlihockey"),
+            ("Alpha", "Αlphа"),
+            ("Team 0", "Team O"),
+            ("ＡＢＣ", "abc"),
+            ("Zoë", "ZOE\u{308}"),
+            ("می‌خواهم", "میخواهم"),
+        ] {
+            assert_eq!(name_skeleton(name), name_skeleton(other), "{name} {other}");
+        }
+        for (name, other) in [("Alpha", "Alpha 2"), ("Zoë", "Zoe"), ("Team 1", "Team 2")] {
+            assert_ne!(name_skeleton(name), name_skeleton(other), "{name} {other}");
         }
     }
 
@@ -133,6 +231,20 @@ mod tests {
             Err(NameProblem::Length(41))
         );
         assert_eq!(check("<b>"), Err(NameProblem::Character('<')));
+        assert_eq!(
+            check("a\u{200d}b"),
+            Err(NameProblem::Character('\u{200d}')),
+            "an invisible character between Latin letters"
+        );
+        assert_eq!(
+            check(&format!("a{}", "\u{301}".repeat(MAX_MARKS + 1))),
+            Err(NameProblem::Marks)
+        );
+        assert_eq!(
+            check("\u{301}a"),
+            Err(NameProblem::Character('\u{301}')),
+            "a mark without a letter"
+        );
         for invisible in ['\u{202e}', '\u{200f}', '\u{3164}', '\u{1b}', '\u{9b}'] {
             assert_eq!(
                 check(&format!("a{invisible}b")),

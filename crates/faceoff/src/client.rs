@@ -35,7 +35,7 @@ use faceoff_api::{
 };
 use faceoff_types::{Task, url_without_password};
 use http::Address;
-pub use http::is_this_machine;
+pub use http::{is_this_machine, server_address};
 pub use links::LinkTarget;
 use reqwest::{Method, RequestBuilder, Response, StatusCode, header};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -94,10 +94,19 @@ pub async fn retry_temporary<T>(
     patience: Duration,
     request: impl AsyncFn() -> anyhow::Result<T>,
 ) -> anyhow::Result<T> {
+    retry_while(is_temporary, patience, request).await
+}
+
+/// Repeats a request while its failures are such, for at most `patience`.
+async fn retry_while<T>(
+    is_such: impl Fn(&anyhow::Error) -> bool,
+    patience: Duration,
+    request: impl AsyncFn() -> anyhow::Result<T>,
+) -> anyhow::Result<T> {
     let give_up_at = Instant::now() + patience;
     loop {
         match request().await {
-            Err(error) if is_temporary(&error) && Instant::now() < give_up_at => {
+            Err(error) if is_such(&error) && Instant::now() < give_up_at => {
                 tokio::time::sleep(RETRY_PAUSE).await;
             }
             result => return result,
@@ -223,9 +232,12 @@ impl Client {
     }
 
     fn request(&self, method: Method, path: &str) -> RequestBuilder {
-        let request = self
-            .http
-            .request(method, format!("{}{API_BASE}{path}", self.address.base));
+        self.request_by(&self.http, method, path)
+    }
+
+    /// A request that another HTTP client sends.
+    fn request_by(&self, http: &reqwest::Client, method: Method, path: &str) -> RequestBuilder {
+        let request = http.request(method, format!("{}{API_BASE}{path}", self.address.base));
         match &self.token {
             Some(token) => request.bearer_auth(token),
             None => request,

@@ -73,6 +73,12 @@ pub struct ServerConfig {
     /// Public address of the server, for links: http or https, without a trailing slash.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub public_url: Option<String>,
+    /// Folder with further files for `/downloads`, such as the Python package; left out: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub downloads_dir: Option<PathBuf>,
+    /// Address of the source code, for the page `/downloads`; left out: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub source_url: Option<String>,
     /// Address of metrics and health checks without a token; left out: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub metrics_listen: Option<SocketAddr>,
@@ -88,6 +94,8 @@ impl Default for ServerConfig {
         Self {
             listen: SocketAddr::from(([127, 0, 0, 1], 8080)),
             public_url: None,
+            downloads_dir: None,
+            source_url: None,
             metrics_listen: None,
             data_dir: PathBuf::from("faceoff-data"),
             min_free_bytes: 1 << 30,

@@ -1,5 +1,6 @@
 //! Credentials of `faceoff login`: one token per server, in a file that only its owner can read.
 
+use crate::client::server_address;
 use anyhow::{Context, ensure};
 use serde::{Deserialize, Serialize};
 use std::{
@@ -60,15 +61,6 @@ pub fn path() -> anyhow::Result<PathBuf> {
     Ok(config.join("faceoff/credentials.toml"))
 }
 
-/// The normalised address of a server.
-fn normalise(server: &str) -> String {
-    match reqwest::Url::parse(server) {
-        Ok(url) => url.as_str().trim_end_matches('/').to_owned(),
-        // The request with this address reports the error.
-        Err(_) => server.to_owned(),
-    }
-}
-
 impl Credentials {
     /// Reads the file; empty if it does not exist.
     ///
@@ -123,17 +115,17 @@ impl Credentials {
 
     /// This is the server of commands without `--server`.
     pub fn is_default(&self, server: &str) -> bool {
-        self.default == Some(normalise(server))
+        self.default == Some(server_address(server))
     }
 
     /// The login to a server.
     pub fn login(&self, server: &str) -> Option<&Login> {
-        self.servers.get(&normalise(server))
+        self.servers.get(&server_address(server))
     }
 
     /// Adds or replaces a login. Its server becomes the default if `is_default`, or if there is no other default.
     pub fn add(&mut self, server: &str, login: Login, is_default: bool) {
-        let server = normalise(server);
+        let server = server_address(server);
         if is_default || self.default.is_none() {
             self.default = Some(server.clone());
         }
@@ -142,7 +134,7 @@ impl Credentials {
 
     /// Removes a login. If it was the default, the only remaining server becomes the default.
     pub fn remove(&mut self, server: &str) -> Option<Login> {
-        let server = normalise(server);
+        let server = server_address(server);
         let removed = self.servers.remove(&server)?;
         if self.default.as_ref() == Some(&server) {
             let mut remaining = self.servers.keys();

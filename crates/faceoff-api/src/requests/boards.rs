@@ -64,6 +64,10 @@ pub enum BoardFormat {
     Json,
     /// CSV with a header line.
     Csv,
+    /// CSV for spreadsheets in countries that write 1.5, with a byte order mark.
+    Spreadsheet,
+    /// CSV for spreadsheets in countries that write 1,5, with semicolons and a byte order mark.
+    SpreadsheetComma,
 }
 
 /// Query of a board page: the board, and how it is sorted.

@@ -24,7 +24,7 @@ use utoipa::ToSchema;
 #[serde(default, deny_unknown_fields)]
 #[schema(as = StageChange)]
 pub struct StagePatch {
-    /// 1 to 40 characters: letters, digits, spaces and . _ -
+    /// 1 to 40 letters and digits of any script, spaces and . _ - ' & + ·
     #[cfg_attr(feature = "clap", arg(skip))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
@@ -333,7 +333,7 @@ impl StagePatch {
 /// A stage to create.
 #[derive(Debug, Clone, Serialize)]
 pub struct NewStage {
-    /// 1 to 40 characters: letters, digits, spaces and . _ -
+    /// 1 to 40 letters and digits of any script, spaces and . _ - ' & + ·
     pub name: String,
     /// Its settings, without a name and a confirmation.
     #[serde(flatten)]

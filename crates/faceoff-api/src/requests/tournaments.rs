@@ -19,7 +19,7 @@ type SettingsPatch = MergePatch<TournamentSettings>;
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewTournament {
-    /// 1 to 40 characters: letters, digits, spaces and . _ -
+    /// 1 to 40 letters and digits of any script, spaces and . _ - ' & + ·
     pub name: String,
     /// Id or name of the stage whose board qualifies the teams. Default: the open stage, or the one nearest in time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -41,7 +41,7 @@ pub struct NewTournament {
 #[derive(Debug, Clone, Default, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TournamentChange {
-    /// 1 to 40 characters: letters, digits, spaces and . _ -
+    /// 1 to 40 letters and digits of any script, spaces and . _ - ' & + ·
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
     /// A JSON merge patch (RFC 7396) of the rules, before the first round only. null restores the default of an optional field.

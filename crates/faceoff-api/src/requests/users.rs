@@ -81,7 +81,7 @@ pub struct NewInvitation {
 pub struct JoinRequest {
     /// The code at the end of the invitation link.
     pub code: String,
-    /// The new user's name, with which the user also signs in. 1 to 40 characters: letters, digits, spaces and `. _ -`.
+    /// The new user's name, with which the user also signs in. 1 to 40 letters and digits of any script, spaces and . _ - ' & + ·
     /// Left out for the role `return`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<UserName>,
@@ -100,7 +100,7 @@ pub struct JoinRequest {
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FoundedTeam {
-    /// 1 to 40 characters: letters, digits, spaces and . _ -
+    /// 1 to 40 letters and digits of any script, spaces and . _ - ' & + ·
     pub name: TeamName,
     /// The team's institution or company. 1 to 120 characters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -130,7 +130,7 @@ pub struct RegistrationRequest {
 #[derive(Debug, Clone, Default, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TeamChange {
-    /// 1 to 40 characters: letters, digits, spaces and . _ -
+    /// 1 to 40 letters and digits of any script, spaces and . _ - ' & + ·
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<TeamName>,
     /// The team's institution or company. 1 to 120 characters; null removes it.

@@ -24,6 +24,7 @@ pub mod invitation;
 pub mod link;
 pub mod live;
 pub mod me;
+pub mod partial_upload;
 pub mod proposal;
 pub mod queue;
 pub mod ruling;

@@ -69,6 +69,33 @@ async fn rate_limit_applies_per_address() {
 }
 
 #[tokio::test]
+async fn signed_in_callers_share_no_rate_limit_of_an_address() {
+    let site = Site::start().await;
+    let [alpha, beta] = [site.team("Alpha").await, site.team("Beta").await];
+    let rates = RateLimits {
+        address: limit_with_burst(5),
+        ..RateLimits::default()
+    };
+    let site = site.with_rates(rates).await;
+    let status = async |token: Option<&str>| {
+        let request = site.request(Method::GET, "/api/v1/me", token);
+        let request = request.header("x-forwarded-for", "192.0.2.1");
+        request.send().await.unwrap().status().as_u16()
+    };
+    for team in [&alpha, &beta] {
+        assert_eq!(status(Some(&team.token)).await, 200);
+    }
+    let refused = request_until_refused(&site, None, Some("192.0.2.1")).await;
+    refused.problem(429, "too-many-requests", &["an address"]);
+    // An unknown token counts as a visitor's.
+    assert_eq!(status(Some("fo_unknown")).await, 429);
+    assert_eq!(status(Some(&beta.token)).await, 200);
+    let refused = request_until_refused(&site, Some(&alpha.token), Some("192.0.2.1")).await;
+    refused.problem(429, "too-many-requests", &["a signed-in caller"]);
+    assert_eq!(status(Some(&beta.token)).await, 200);
+}
+
+#[tokio::test]
 async fn rate_limit_applies_per_token() {
     let site = Site::start().await;
     let [alpha, beta] = [site.team("Alpha").await, site.team("Beta").await];

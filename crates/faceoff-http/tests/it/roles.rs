@@ -119,6 +119,9 @@ const ACCESS_TABLE: &[(&str, &str)] = &[
     ("POST /teams/{id}/return", "?00-+++"),
     ("POST /teams/{id}/token", "?----++"),
     ("GET /terms", "+++++++"),
+    ("DELETE /uploads/{blake3}", "?++++--"),
+    ("GET /uploads/{blake3}", "?++++--"),
+    ("PATCH /uploads/{blake3}", "?++++--"),
     ("POST /terms", "?----++"),
     ("POST /terms/{version}/accept", "?-+-++-"),
     ("GET /tokens", "?++++++"),
@@ -387,6 +390,7 @@ impl RoleFixture {
             .replace("{episode}", "0")
             .replace("{profile}", "ideal")
             .replace("{chunk}", "0")
+            .replace("{blake3}", "unknown")
             .replace("{version}", "7");
         format!("/api/v1{path}")
     }

@@ -5,8 +5,8 @@ use faceoff_airhockey::{AirHockey, EVALUATION, HIT, TASKS};
 use faceoff_api::token::hash_token;
 use faceoff_episode::Simulator;
 use faceoff_http::{
-    AgentResources, Capacity, CapacityMonitor, ConnectionLimits, HttpConfig, HttpLimits, LinkKey,
-    MinTransferRate, RateLimits, router,
+    AgentResources, Capacity, CapacityMonitor, ConnectionLimits, Download, Downloads, HttpConfig,
+    HttpLimits, LinkKey, MinTransferRate, RateLimits, router,
 };
 use faceoff_live::LiveState;
 use faceoff_metrics::{Metrics, Process};
@@ -217,6 +217,8 @@ fn config_without_slots(upload_dir: PathBuf, clock: Clock) -> HttpConfig {
     HttpConfig {
         simulator: faceoff_airhockey::simulator(),
         max_bundle_bytes: MAX_BUNDLE_BYTES,
+        downloads: Arc::default(),
+        source_url: None,
         public_url: None,
         upload_dir,
         clock,
@@ -287,6 +289,14 @@ impl Site {
         };
         let simulator = AirHockey::with_competition(competition);
         self.with_simulator(Arc::new(simulator)).await
+    }
+
+    /// Restarts the server with these downloads and this address of the source code.
+    pub async fn with_downloads(mut self, downloads: Vec<Download>, source_url: &str) -> Self {
+        self.config.downloads = Arc::new(Downloads::new(downloads));
+        self.config.source_url = Some(source_url.to_owned());
+        self.restart().await;
+        self
     }
 
     /// Restarts the server with another competition.

@@ -11,7 +11,7 @@ use axum::{body::Body, extract::State, http::HeaderMap, response::Response};
 use faceoff_service::{
     app::App,
     problem::{Problem, ProblemKind},
-    services::uploads::{IncomingBundle, upload},
+    services::uploads::{BundleSource, IncomingBundle, upload},
     session,
 };
 use faceoff_store::Submission;
@@ -30,9 +30,12 @@ async fn receive_bundle(
         ));
     }
     let incoming = IncomingBundle {
-        bytes: file.bytes,
         claimed_name: file.name,
-        body: file.body,
+        key: None,
+        source: BundleSource::Body {
+            bytes: file.bytes,
+            body: file.body,
+        },
     };
     upload(app, &member.team, incoming).await
 }

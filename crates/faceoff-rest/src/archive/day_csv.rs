@@ -2,11 +2,11 @@
 
 use crate::board_csv::{score_columns, table_with_tasks, task_fields, tier_fields};
 use faceoff_api::views::evaluation::{EvaluationStatus, EvaluationView};
-use faceoff_service::csv::{escape_formula, or_empty};
+use faceoff_service::csv::{Table, escape_formula, or_empty};
 use faceoff_types::Competition;
 
 /// A table with one line per evaluation.
-pub(super) fn day_table(competition: &Competition, evaluations: &[EvaluationView]) -> Vec<u8> {
+pub(super) fn day_table(competition: &Competition, evaluations: &[EvaluationView]) -> Table {
     let mut columns = vec![
         "evaluation",
         "team",
@@ -73,5 +73,5 @@ pub(super) fn day_table(competition: &Competition, evaluations: &[EvaluationView
                 .chain(task_fields(competition, tasks, score_columns.len())),
         );
     }
-    table.into_bytes()
+    table
 }

@@ -13,7 +13,7 @@ use faceoff_api::{
 use faceoff_archive::Edition;
 use faceoff_service::{
     app::{App, AppState},
-    csv,
+    csv::{self, CsvFormat},
     problem::Problem,
     viewer::Viewer,
     views::{
@@ -158,7 +158,7 @@ async fn put_boards(
     files
         .put(
             &format!("{folder}/board.csv"),
-            board_csv::board_table(app.config.competition(), &newest),
+            board_csv::board_table(app.config.competition(), &newest).into_bytes(CsvFormat::Csv),
         )
         .await?;
     for task in &stage.rules.rules.tasks {
@@ -179,7 +179,7 @@ async fn put_boards(
         files
             .put(
                 &format!("{name}.csv"),
-                board_csv::board_table(app.config.competition(), &board),
+                board_csv::board_table(app.config.competition(), &board).into_bytes(CsvFormat::Csv),
             )
             .await?;
     }
@@ -202,7 +202,7 @@ async fn put_day(
     files
         .put(
             &format!("{name}.csv"),
-            day_csv::day_table(app.config.competition(), &evaluations),
+            day_csv::day_table(app.config.competition(), &evaluations).into_bytes(CsvFormat::Csv),
         )
         .await
 }
@@ -332,7 +332,9 @@ pub(super) async fn add_artifacts(
         }
         sources.insert(path, (source, bytes, blake3));
     }
-    files.put("datasets.csv", table.into_bytes()).await?;
+    files
+        .put("datasets.csv", table.into_bytes(CsvFormat::Csv))
+        .await?;
     for (path, (source, bytes, blake3)) in sources {
         files.add_hashed(&path, source, bytes, blake3);
     }

@@ -20,6 +20,8 @@ struct Extensions {
     link: Option<Vec<u8>>,
     size: Option<u64>,
     is_sparse: bool,
+    /// The name of a sparse file; its `path` is that of a substitute.
+    sparse_name: Option<Vec<u8>>,
 }
 
 /// Unpacks a decompressed tar stream.
@@ -60,7 +62,8 @@ pub(super) fn unpack<'a>(
                     .unwrap_or_else(|| header.path_bytes().into_owned());
                 let name = utf8_name(path)?;
                 if entry_extensions.is_sparse {
-                    return Err(sparse_error(&name));
+                    let real_name = entry_extensions.sparse_name.map(utf8_name).transpose()?;
+                    return Err(sparse_error(real_name.as_deref().unwrap_or(&name)));
                 }
                 // A size that does not fit into the header's field exceeds every limit. A different size would make
                 // readers disagree about the start of the next entry.
@@ -191,6 +194,10 @@ fn read_pax(mut bytes: &[u8], extensions: &mut Extensions) -> Result<(), BundleE
             b"linkpath" => extensions.link = Some(value.to_vec()),
             // An invalid parse_number becomes a size that no header has.
             b"size" => extensions.size = Some(parse_number(value).unwrap_or(u64::MAX)),
+            b"GNU.sparse.name" => {
+                extensions.is_sparse = true;
+                extensions.sparse_name = Some(value.to_vec());
+            }
             key if key.starts_with(b"GNU.sparse") => extensions.is_sparse = true,
             _ => {}
         }

@@ -71,6 +71,17 @@ fn skipped_content_is_counted() {
         )
         .file("x", 0o644, b"");
     assert_refused(&sparse.gz(), "sparse");
+    // GNU tar gives the content another name, and the real one in the extension.
+    let named = Tar::with_manifest()
+        .entry(
+            EntryType::XHeader,
+            "x",
+            0o644,
+            "",
+            b"22 GNU.sparse.major=1\n31 GNU.sparse.name=weights.bin\n",
+        )
+        .file("GNUSparseFile.7/weights.bin", 0o644, b"");
+    assert_refused(&named.gz(), "entry \"weights.bin\" is a sparse file");
 }
 
 #[test]

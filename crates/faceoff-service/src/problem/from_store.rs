@@ -14,7 +14,7 @@ impl From<StoreError> for Problem {
             StoreError::TeamNameTaken(name) => Self::new(
                 ProblemKind::TeamNameTaken,
                 format!(
-                    "a team named {name:?} exists already; choose another name, or create a new token \
+                    "a team named {name:?} exists already, and names that look alike count as the same; choose another name, or create a new token \
                      for the team with POST /api/v1/teams/ID/token"
                 ),
             ),
@@ -76,7 +76,7 @@ impl From<StoreError> for Problem {
             error @ StoreError::OutcomesRemoved { .. } => Self::new(ProblemKind::Gone, error.to_string()),
             StoreError::UserNameTaken(name) => Self::new(
                 ProblemKind::UserNameTaken,
-                format!("a user named {name:?} exists already; choose another name"),
+                format!("a user named {name:?} exists already, and names that look alike count as the same; choose another name"),
             ),
             error @ StoreError::TokenInvalid => {
                 Self::new(ProblemKind::Unauthenticated, error.to_string())
@@ -84,6 +84,14 @@ impl From<StoreError> for Problem {
             error @ StoreError::InvitationInvalid(_) => {
                 Self::new(ProblemKind::InvitationInvalid, error.to_string())
             }
+            StoreError::KeyUsed { submission } => Self::new(
+                ProblemKind::InvalidContent,
+                format!(
+                    "the header Idempotency-Key has the key of the submission {submission}, whose bundle is another one; use a new \
+                     key for each bundle"
+                ),
+            )
+            .with("field", "Idempotency-Key"),
             error @ StoreError::CutoffPassed { .. } => {
                 Self::new(ProblemKind::CutoffPassed, error.to_string())
             }

@@ -3,6 +3,7 @@
 
 use crate::{app::AppState, boxed, network::Network, problem::Problem, text};
 use faceoff_api::{
+    pasted::InvitationLink,
     requests::{self, FoundedTeam, InvitedRole},
     token::{Secret, SecretKind, hash_token},
 };
@@ -60,7 +61,9 @@ pub async fn join(
     client: Option<Network>,
 ) -> Result<(JoinOutcome, Secret), Problem> {
     let now = app.config.clock.now();
-    let code_hash = hash_token(request.code.trim());
+    let code = InvitationLink::find(&request.code);
+    let code = code.map_or_else(|| request.code.trim().to_owned(), |link| link.code);
+    let code_hash = hash_token(&code);
     // Checked before the password is hashed, which is expensive.
     app.store.code_status(code_hash, now).await?;
     let team = request.team.map(checked_profile).transpose()?;

@@ -10,24 +10,34 @@ use crate::{
 use axum::body::{Body, BodyDataStream};
 use faceoff_types::ArchiveFormat;
 use futures::StreamExt;
-use std::path::Path;
-use tempfile::NamedTempFile;
+use std::{io, path::Path};
+use tempfile::{NamedTempFile, TempPath};
 use tokio::{io::AsyncWriteExt, time::Instant};
 
 /// Number of first bytes that the message about an unknown format quotes. A format is recognised by its first bytes, and all but
 /// a plain tar by the first four.
 const QUOTED_BYTES: usize = 4;
 
-/// A bundle on disk; the file is removed when this is dropped.
+/// A bundle on disk. The file is removed when this is dropped, unless it is that of an upload in parts.
 #[derive(Debug)]
 pub struct ReceivedBundle {
-    pub file: NamedTempFile,
+    pub file: TempPath,
     /// Size of the bundle in bytes.
     pub bytes: u64,
     /// BLAKE3 hash of the whole bundle.
     pub blake3: blake3::Hash,
     /// Detected from the first bytes.
     pub format: ArchiveFormat,
+}
+
+impl ReceivedBundle {
+    /// Removes the file, whichever kind of upload it is of.
+    ///
+    /// # Errors
+    /// If it cannot be removed.
+    pub(super) fn remove(self) -> io::Result<()> {
+        self.file.close()
+    }
 }
 
 /// Size limit of a bundle.
@@ -38,7 +48,7 @@ pub(crate) struct SizeLimit {
 }
 
 /// A body that must arrive at a minimum transfer rate.
-struct RateGuardedBody {
+pub(super) struct RateGuardedBody {
     stream: BodyDataStream,
     rate: MinTransferRate,
     guard: TransferRateGuard,
@@ -97,7 +107,7 @@ pub(crate) async fn receive(
     // The artifact is copied from this file by name, so the writer's buffer must be flushed.
     writer.flush().await.map_err(free_space::write_problem)?;
     Ok(ReceivedBundle {
-        file,
+        file: file.into_temp_path(),
         bytes,
         blake3: hasher.finalize(),
         format,
@@ -152,7 +162,7 @@ pub async fn discard(body: Body, rate: MinTransferRate, max_bytes: u64) {
 }
 
 impl RateGuardedBody {
-    fn new(body: Body, rate: MinTransferRate) -> Self {
+    pub(super) fn new(body: Body, rate: MinTransferRate) -> Self {
         Self {
             stream: body.into_data_stream(),
             rate,
@@ -160,7 +170,7 @@ impl RateGuardedBody {
         }
     }
 
-    async fn next_chunk(&mut self) -> Result<Option<axum::body::Bytes>, Problem> {
+    pub(super) async fn next_chunk(&mut self) -> Result<Option<axum::body::Bytes>, Problem> {
         let started = Instant::now();
         let received = tokio::time::timeout(self.guard.remaining(), self.stream.next()).await;
         self.guard.record_wait(started.elapsed());
@@ -206,7 +216,7 @@ pub(crate) fn too_large(max_bytes: u64, announced_bytes: Option<u64>) -> Problem
     .with("limit_bytes", max_bytes)
 }
 
-fn not_an_archive(first_bytes: &[u8]) -> Problem {
+pub(super) fn not_an_archive(first_bytes: &[u8]) -> Problem {
     Problem::new(
         ProblemKind::UnsupportedMediaType,
         format!(

@@ -9,6 +9,7 @@ pub mod decisions;
 pub mod entrants;
 pub mod evaluations;
 pub mod invitations;
+pub mod partial_uploads;
 pub mod registrations;
 pub mod rulings;
 pub mod sessions;

@@ -1,56 +1,157 @@
 //! Uploads of submissions: a team sends a *bundle* (archive file or container image with its agent), and a validation run checks it.
 
-use super::bundle_stream::{self, ReceivedBundle, SizeLimit};
+use super::{
+    bundle_stream::{self, ReceivedBundle, SizeLimit},
+    partial_uploads,
+};
 use crate::{
     app::App,
     auth::TeamCaller,
     boxed, free_space,
+    partial_uploads::PartialUploadLock,
     problem::{Problem, ProblemKind},
     upload_slots::UploadSlot,
     views::stage,
 };
 use axum::body::Body;
 use faceoff_store::{Actor, StoreError, Submission, Team, UploadQuota, UploadUsage};
-use faceoff_types::{ArchiveFormat, BundleRef};
+use faceoff_types::{ArchiveFormat, BundleRef, IdempotencyKey, TeamId};
 use jiff::Timestamp;
 use std::sync::Arc;
 use uuid::Uuid;
 
 /// A bundle that is being uploaded.
 pub struct IncomingBundle {
-    /// Number of bytes that the client has announced (`Content-Length`).
-    pub bytes: Option<u64>,
     /// File name from the client; not yet sanitised.
     pub claimed_name: String,
-    /// The bundle's bytes.
-    pub body: Body,
+    /// Identifies the upload, so that it can be sent again without creating a second submission.
+    pub key: Option<IdempotencyKey>,
+    pub source: BundleSource,
 }
 
-/// Receives a bundle, creates the submission and queues its validation run.
+/// Where a bundle comes from.
+pub enum BundleSource {
+    /// The request's body.
+    Body {
+        /// Number of bytes that the client has announced (`Content-Length`).
+        bytes: Option<u64>,
+        body: Body,
+    },
+    /// The parts that were uploaded before, of a bundle with this hash.
+    Parts(blake3::Hash),
+}
+
+/// Receives a bundle, creates the submission and queues its validation run. If a bundle with the same key was uploaded before, it
+/// returns that submission.
 #[boxed]
 pub async fn upload(
     app: &App,
     caller: &TeamCaller,
     incoming: IncomingBundle,
 ) -> Result<Submission, Problem> {
-    let (team, actor) = (caller.team.clone(), caller.actor());
+    let team = caller.team.id;
     free_space::check(app)?;
-    let slot = app.upload_slots.acquire(team.id).ok_or_else(|| {
+    let earlier = match &incoming.key {
+        Some(key) => app.store.uploaded_with_key(team, key).await?,
+        None => None,
+    };
+    let slot = acquire_slot(app, team)?;
+    let (received, lock) = match incoming.source {
+        BundleSource::Body { bytes, body } => {
+            let received = receive(app, team, (bytes, body), earlier.as_ref()).await?;
+            (received, None)
+        }
+        BundleSource::Parts(hash) => {
+            if let Some(earlier) = earlier {
+                return same_bundle(earlier, &hash);
+            }
+            check_may_upload(app, team, &UploadLimits::current(app).await?).await?;
+            let (received, lock) = partial_uploads::complete(app, team, hash).await?;
+            (received, Some(lock))
+        }
+    };
+    if let Some(earlier) = earlier {
+        return same_bundle(earlier, &received.blake3);
+    }
+    // If the client disconnects, this handler is dropped. A separate task stores the received bundle nevertheless.
+    let stored = tokio::spawn(store(
+        Arc::clone(app),
+        (caller.team.clone(), caller.actor()),
+        received,
+        (incoming.claimed_name, incoming.key),
+        (slot, lock),
+    ));
+    stored.await.map_err(Problem::internal)?
+}
+
+/// The submission that was uploaded with the same key, if its bundle is the same.
+fn same_bundle(earlier: Submission, received: &blake3::Hash) -> Result<Submission, Problem> {
+    if earlier.bundle.blake3 == received.to_string() {
+        return Ok(earlier);
+    }
+    Err(StoreError::KeyUsed {
+        submission: earlier.id,
+    }
+    .into())
+}
+
+/// Receives the body of an upload. With an `earlier` upload with the same key, it only has to be compared.
+async fn receive(
+    app: &App,
+    team: TeamId,
+    (bytes, body): (Option<u64>, Body),
+    earlier: Option<&Submission>,
+) -> Result<ReceivedBundle, Problem> {
+    let limit = match earlier {
+        Some(_) => SizeLimit {
+            max_bytes: app.config.max_bundle_bytes,
+            make_problem: Box::new({
+                let max_bytes = app.config.max_bundle_bytes;
+                move |announced| bundle_stream::too_large(max_bytes, announced)
+            }),
+        },
+        None => {
+            let limits = UploadLimits::current(app).await?;
+            check_may_upload(app, team, &limits).await?;
+            let now = app.config.clock.now();
+            let usage = app.store.upload_usage(team, now).await?;
+            size_limit(app, limits.quota, usage, now)
+        }
+    };
+    let (dir, rate) = (&app.config.upload_dir, app.config.limits.min_upload_rate);
+    bundle_stream::receive(body, bytes, dir, &limit, rate).await
+}
+
+/// A slot of the team for the duration of an upload.
+///
+/// # Errors
+/// `TooManyUploads`.
+pub(super) fn acquire_slot(app: &App, team: TeamId) -> Result<UploadSlot, Problem> {
+    app.upload_slots.acquire(team).ok_or_else(|| {
         let limit = app.config.limits.team_uploads;
         Problem::new(
             ProblemKind::TooManyUploads,
             format!("{limit} uploads of your team are running already; wait until one has ended"),
         )
         .with("limit", limit)
-    })?;
-    // The store checks this, too, but only after the transfer.
+    })
+}
+
+/// Whether the team may upload a bundle now. The store checks this, too, but only after the transfer.
+///
+/// # Errors
+/// `SeasonClosed` or `TooManyPending`.
+pub(super) async fn check_may_upload(
+    app: &App,
+    team: TeamId,
+    limits: &UploadLimits,
+) -> Result<(), Problem> {
     if let Some(closed_at) = app.store.season().await?.closed_at {
         return Err(StoreError::SeasonClosed { closed_at }.into());
     }
-    let limits = UploadLimits::current(app).await?;
     let pending = app
         .store
-        .submissions_of(team.id)
+        .submissions_of(team)
         .await?
         .iter()
         .filter(|submission| !submission.state.is_checked())
@@ -64,38 +165,19 @@ pub async fn upload(
             ),
         ));
     }
-
-    let now = app.config.clock.now();
-    let usage = app.store.upload_usage(team.id, now).await?;
-    let received = bundle_stream::receive(
-        incoming.body,
-        incoming.bytes,
-        &app.config.upload_dir,
-        &size_limit(app, limits.quota, usage, now),
-        app.config.limits.min_upload_rate,
-    )
-    .await?;
-    // If the client disconnects, this handler is dropped. A separate task stores the received bundle nevertheless.
-    let stored = tokio::spawn(store(
-        Arc::clone(app),
-        (team, actor),
-        received,
-        incoming.claimed_name,
-        slot,
-    ));
-    stored.await.map_err(Problem::internal)?
+    Ok(())
 }
 
 /// Upload limits of a team, from the current stage or the server's configuration.
 #[derive(Clone, Copy)]
-struct UploadLimits {
+pub(super) struct UploadLimits {
     /// Largest number of submissions that wait for their validation run.
     max_pending: usize,
-    quota: UploadQuota,
+    pub(super) quota: UploadQuota,
 }
 
 impl UploadLimits {
-    async fn current(app: &App) -> Result<Self, Problem> {
+    pub(super) async fn current(app: &App) -> Result<Self, Problem> {
         let limits = &app.config.limits;
         let stage_limits = stage::current(app).await?.settings.uploads;
         let quota = limits.upload_quota;
@@ -112,7 +194,12 @@ impl UploadLimits {
 }
 
 /// The size limit of a bundle: the limit for all teams, or the rest of the team's quota if that is less.
-fn size_limit(app: &App, quota: UploadQuota, usage: UploadUsage, now: Timestamp) -> SizeLimit {
+pub(super) fn size_limit(
+    app: &App,
+    quota: UploadQuota,
+    usage: UploadUsage,
+    now: Timestamp,
+) -> SizeLimit {
     let max_bundle_bytes = app.config.max_bundle_bytes;
     let left_bytes = quota.remaining(usage);
     SizeLimit {
@@ -134,8 +221,8 @@ async fn store(
     app: App,
     (team, actor): (Team, Actor),
     received: ReceivedBundle,
-    claimed_name: String,
-    _slot: UploadSlot,
+    (claimed_name, key): (String, Option<IdempotencyKey>),
+    _guards: (UploadSlot, Option<PartialUploadLock>),
 ) -> Result<Submission, Problem> {
     let bundle = BundleRef {
         key: format!(
@@ -154,27 +241,29 @@ async fn store(
         .await
         .map_err(Problem::internal)?;
     let artifacts = app.store.artifacts();
-    artifacts
-        .put_file(&bundle.key, received.file.path())
-        .await?;
-    let key = bundle.key.clone();
+    artifacts.put_file(&bundle.key, &received.file).await?;
+    let artifact = bundle.key.clone();
     let now = app.config.clock.now();
     let quota = UploadLimits::current(&app).await?.quota;
     let created = app
         .store
-        .create_submission(actor, team.id, bundle, &quota, now)
+        .create_submission_once(actor, team.id, bundle, key.as_ref(), &quota, now)
         .await;
+    if !matches!(&created, Ok(submission) if submission.bundle.key == artifact)
+        && let Err(failure) = artifacts.delete(&artifact).await
+    {
+        tracing::warn!(artifact, %failure, "an artifact without a submission could not be deleted");
+    }
     match created {
         Ok(submission) => {
             tracing::info!(team = %team.name, submission = %submission.id, bytes = received.bytes, "uploaded");
+            // That of an upload in parts has been kept until now.
+            if let Err(failure) = received.remove() {
+                tracing::warn!(%failure, "an uploaded file could not be removed");
+            }
             Ok(submission)
         }
-        Err(error) => {
-            if let Err(failure) = artifacts.delete(&key).await {
-                tracing::warn!(key, %failure, "an artifact without a submission could not be deleted");
-            }
-            Err(Problem::with_quota_reset(error, now))
-        }
+        Err(error) => Err(Problem::with_quota_reset(error, now)),
     }
 }
 

@@ -18,7 +18,7 @@ use crate::{
     },
     write::Tx,
 };
-use faceoff_types::{DivisionName, RegistrationId, TeamName};
+use faceoff_types::{DivisionName, RegistrationId, TeamName, name_skeleton};
 use jiff::Timestamp;
 
 /// Maximum number of pending registrations: sending one needs no account, and an organiser reads each of them.
@@ -54,7 +54,7 @@ async fn find_pending(tx: &mut Tx, id: RegistrationId) -> Result<Registration> {
 impl Store {
     /// Adds the registration of a team. [`StoreError::Conflict`] if registration is closed, [`MAX_PENDING_REGISTRATIONS`]
     /// are pending, or a field is missing; [`StoreError::TeamNameTaken`] if a team or a pending registration has the
-    /// name.
+    /// name, or one that looks like it.
     #[boxed]
     pub async fn register(&self, new: NewRegistration, now: Timestamp) -> Result<Registration> {
         self.write(Actor::Visitor, now, async |tx| {
@@ -74,11 +74,14 @@ impl Store {
                 Some(name) => Some(divisions::check(tx, name).await?),
                 None => None,
             };
-            let is_taken = teams::all(tx).await?.iter().any(|team| {
-                team.name.as_str().to_lowercase() == new.team_name.as_str().to_lowercase()
-            });
-            if is_taken || registrations::is_pending(tx, &new.team_name).await? {
-                return Err(StoreError::TeamNameTaken(new.team_name.to_string()));
+            teams::check_name(tx, None, &new.team_name).await?;
+            let skeleton = name_skeleton(new.team_name.as_str());
+            let pending = registrations::pending_names(tx).await?;
+            if let Some(name) = pending
+                .into_iter()
+                .find(|name| name_skeleton(name.as_str()) == skeleton)
+            {
+                return Err(StoreError::TeamNameTaken(name.to_string()));
             }
             let registration = Registration {
                 id: RegistrationId::new(),

@@ -111,7 +111,7 @@ const STEPS: &[(Scope, &str)] = &[
         AND id NOT IN (SELECT submission_id FROM ablations) AND id NOT IN (SELECT submission_id FROM contestants)
         AND id NOT IN (SELECT submission_id FROM round_submissions)"),
     (Scope::Public, "UPDATE submissions SET bundle_key = '', bundle_bytes = 0, bundle_blake3 = '', bundle_file_name = '',
-        label = NULL, note = NULL, timing = NULL, runtime = NULL, withdrawn_at = NULL, deleted_at = NULL, deleted_by = NULL,
+        label = NULL, note = NULL, idempotency_key = NULL, timing = NULL, runtime = NULL, withdrawn_at = NULL, deleted_at = NULL, deleted_by = NULL,
         bundle_removed_at = NULL, bundle_removed_for = NULL, bundle_gone = 0, log = CASE WHEN log IS NOT NULL THEN '' END,
         reason = CASE WHEN reason IS NOT NULL THEN '' END"),
     (Scope::Both, "DELETE FROM validation_runs WHERE submission_id NOT IN (SELECT id FROM submissions)"),

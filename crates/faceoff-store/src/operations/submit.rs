@@ -2,7 +2,7 @@
 
 use crate::{
     boxed,
-    error::Result,
+    error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::purpose,
     queue,
@@ -14,7 +14,7 @@ use crate::{
         teams, validation_runs,
     },
 };
-use faceoff_types::{BundleRef, SubmissionId, TeamId};
+use faceoff_types::{BundleRef, IdempotencyKey, SubmissionId, TeamId};
 use jiff::{Timestamp, tz::TimeZone};
 
 /// Beginning of the UTC day of an instant.
@@ -36,11 +36,18 @@ impl Store {
         .await
     }
 
-    /// Adds a submission whose bundle is stored as an artifact already, and queues its validation run.
-    /// [`StoreError::Disqualified`](crate::StoreError::Disqualified) if the team is disqualified;
-    /// [`StoreError::SeasonClosed`](crate::StoreError::SeasonClosed) once the season is over;
-    /// [`DailyQuotaExceeded`](crate::StoreError::DailyQuotaExceeded) or
-    /// [`StorageQuotaExceeded`](crate::StoreError::StorageQuotaExceeded) beyond the team's quota.
+    /// The team's submission that was uploaded with this key, if there is one.
+    #[boxed]
+    pub async fn uploaded_with_key(
+        &self,
+        team: TeamId,
+        key: &IdempotencyKey,
+    ) -> Result<Option<Submission>> {
+        let mut connection = self.database.read.acquire().await?;
+        submissions::with_idempotency_key(&mut connection, team, key).await
+    }
+
+    /// Adds a submission without an idempotency key, as [`create_submission_once`](Self::create_submission_once).
     #[boxed]
     pub async fn create_submission(
         &self,
@@ -50,7 +57,38 @@ impl Store {
         quota: &UploadQuota,
         now: Timestamp,
     ) -> Result<Submission> {
+        self.create_submission_once(actor, team, bundle, None, quota, now)
+            .await
+    }
+
+    /// Adds a submission whose bundle is stored as an artifact already, and queues its validation run. If the team has uploaded the
+    /// same bundle with this `key` before, it returns that submission, whose artifact is another one.
+    /// [`StoreError::Disqualified`](crate::StoreError::Disqualified) if the team is disqualified;
+    /// [`StoreError::SeasonClosed`](crate::StoreError::SeasonClosed) once the season is over;
+    /// [`DailyQuotaExceeded`](crate::StoreError::DailyQuotaExceeded) or
+    /// [`StorageQuotaExceeded`](crate::StoreError::StorageQuotaExceeded) beyond the team's quota;
+    /// [`KeyUsed`](crate::StoreError::KeyUsed) if another bundle was uploaded with the key.
+    #[boxed]
+    pub async fn create_submission_once(
+        &self,
+        actor: Actor,
+        team: TeamId,
+        bundle: BundleRef,
+        key: Option<&IdempotencyKey>,
+        quota: &UploadQuota,
+        now: Timestamp,
+    ) -> Result<Submission> {
         self.write(actor, now, async |tx| {
+            if let Some(key) = key
+                && let Some(earlier) = submissions::with_idempotency_key(tx, team, key).await?
+            {
+                if earlier.bundle.blake3 == bundle.blake3 {
+                    return Ok(earlier);
+                }
+                return Err(StoreError::KeyUsed {
+                    submission: earlier.id,
+                });
+            }
             season::check_open(tx).await?;
             teams::check_may_compete(tx, team).await?;
             quota.check(
@@ -58,7 +96,7 @@ impl Store {
                 bundle.bytes,
             )?;
             let id = SubmissionId::new();
-            submissions::insert(tx, id, team, &bundle, now).await?;
+            submissions::insert(tx, id, team, &bundle, key, now).await?;
             let account = queue::account(tx, purpose::VALIDATION.lane, &team.to_string()).await?;
             let job = queue::insert(tx, purpose::VALIDATION, account).await?;
             validation_runs::insert(tx, id, job).await?;

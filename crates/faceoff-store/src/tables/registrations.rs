@@ -145,15 +145,13 @@ pub(crate) async fn count_pending(connection: &mut SqliteConnection) -> Result<i
     )
 }
 
-/// Is a registration for this team name pending?
-pub(crate) async fn is_pending(connection: &mut SqliteConnection, name: &TeamName) -> Result<bool> {
-    Ok(sqlx::query_scalar!(
-        r#"SELECT EXISTS (SELECT 1 FROM registrations WHERE state = 'waiting' AND team_name = ? COLLATE NOCASE)
-                  AS "waits!: bool""#,
-        name.as_str()
+/// The names of the teams whose registrations are pending.
+pub(crate) async fn pending_names(connection: &mut SqliteConnection) -> Result<Vec<TeamName>> {
+    Ok(
+        sqlx::query_scalar!("SELECT team_name FROM registrations WHERE state = 'waiting'")
+            .fetch_all(connection)
+            .await?,
     )
-    .fetch_one(connection)
-    .await?)
 }
 
 pub(crate) async fn insert(

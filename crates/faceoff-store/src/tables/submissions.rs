@@ -6,7 +6,7 @@ use crate::{
     event::Actor,
     tables::rulings::Ruling,
 };
-use faceoff_types::{BundleRef, SubmissionId, TeamId, ValidationTiming};
+use faceoff_types::{BundleRef, IdempotencyKey, SubmissionId, TeamId, ValidationTiming};
 use jiff::Timestamp;
 use sqlx::SqliteConnection;
 
@@ -315,25 +315,45 @@ pub(crate) async fn insert(
     id: SubmissionId,
     team: TeamId,
     bundle: &BundleRef,
+    key: Option<&IdempotencyKey>,
     now: Timestamp,
 ) -> Result<()> {
+    let key = key.map(IdempotencyKey::as_str);
     let bytes = i64::try_from(bundle.bytes)
         .map_err(|_| StoreError::Conflict("the bundle is larger than any disk".into()))?;
     sqlx::query!(
         "INSERT INTO submissions (id, team_id, bundle_key, bundle_bytes, bundle_blake3,
-                                  bundle_file_name, created_at, state)
-         VALUES (?, ?, ?, ?, ?, ?, ?, 'validating')",
+                                  bundle_file_name, idempotency_key, created_at, state)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, 'validating')",
         id,
         team,
         bundle.key,
         bytes,
         bundle.blake3,
         bundle.file_name,
+        key,
         Instant(now),
     )
     .execute(connection)
     .await?;
     Ok(())
+}
+
+/// The team's submission that was uploaded with this key.
+pub(crate) async fn with_idempotency_key(
+    connection: &mut SqliteConnection,
+    team: TeamId,
+    key: &IdempotencyKey,
+) -> Result<Option<Submission>> {
+    select_submissions!(
+        "WHERE s.team_id = ? AND s.idempotency_key = ?",
+        team,
+        key.as_str()
+    )
+    .fetch_optional(connection)
+    .await?
+    .map(Submission::try_from)
+    .transpose()
 }
 
 pub(crate) async fn set_valid(

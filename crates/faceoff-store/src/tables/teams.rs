@@ -5,7 +5,7 @@ use crate::{
     error::{Result, StoreError},
     tables::{rulings::Ruling, terms, users},
 };
-use faceoff_types::{DivisionName, StageName, TeamId, TeamName};
+use faceoff_types::{DivisionName, StageName, TeamId, TeamName, name_skeleton};
 use jiff::Timestamp;
 use sqlx::SqliteConnection;
 
@@ -93,8 +93,9 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: TeamId) -> Resul
         .ok_or(StoreError::NotFound("team"))
 }
 
-/// Adds a team. [`StoreError::TeamNameTaken`] if the name exists, regardless of case.
+/// Adds a team. [`StoreError::TeamNameTaken`] if a team has the name, or one that looks like it.
 pub(crate) async fn insert(connection: &mut SqliteConnection, team: &Team) -> Result<()> {
+    check_name(connection, Some(team.id), &team.name).await?;
     let division = team.profile.division.as_ref().map(DivisionName::as_str);
     sqlx::query!(
         "INSERT INTO teams (id, name, created_at, affiliation, link, division) VALUES (?, ?, ?, ?, ?, ?)",
@@ -106,22 +107,21 @@ pub(crate) async fn insert(connection: &mut SqliteConnection, team: &Team) -> Re
         division,
     )
     .execute(connection)
-    .await
-    .map_err(name_error(&team.name))?;
+    .await?;
     Ok(())
 }
 
-/// Renames a team. [`StoreError::TeamNameTaken`] if another team has this name, regardless of case.
+/// Renames a team. [`StoreError::TeamNameTaken`] if another team has this name, or one that looks like it.
 pub(crate) async fn set_name(
     connection: &mut SqliteConnection,
     id: TeamId,
     name: &TeamName,
 ) -> Result<()> {
+    check_name(connection, Some(id), name).await?;
     let text = name.as_str();
     sqlx::query!("UPDATE teams SET name = ? WHERE id = ?", text, id)
         .execute(connection)
-        .await
-        .map_err(name_error(name))?;
+        .await?;
     Ok(())
 }
 
@@ -258,7 +258,20 @@ pub(crate) async fn check_may_compete(connection: &mut SqliteConnection, id: Tea
     }
 }
 
-/// The store's error for a failed write of a team's name.
-fn name_error(name: &TeamName) -> impl FnOnce(sqlx::Error) -> StoreError {
-    StoreError::if_duplicate("teams.name", || StoreError::TeamNameTaken(name.to_string()))
+/// [`StoreError::TeamNameTaken`] if another team has the name, or one that looks like it.
+pub(crate) async fn check_name(
+    connection: &mut SqliteConnection,
+    id: Option<TeamId>,
+    name: &TeamName,
+) -> Result<()> {
+    let skeleton = name_skeleton(name.as_str());
+    let others = sqlx::query_scalar!("SELECT name FROM teams WHERE id IS NOT ?", id);
+    let others = others.fetch_all(connection).await?;
+    match others
+        .into_iter()
+        .find(|other| name_skeleton(other.as_str()) == skeleton)
+    {
+        Some(other) => Err(StoreError::TeamNameTaken(other.to_string())),
+        None => Ok(()),
+    }
 }

@@ -5,7 +5,7 @@ use crate::{
     error::{Result, StoreError},
     tables::tokens::Maker,
 };
-use faceoff_types::{TeamId, UserId, UserName};
+use faceoff_types::{TeamId, UserId, UserName, name_skeleton};
 use jiff::Timestamp;
 use sqlx::SqliteConnection;
 
@@ -86,18 +86,23 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: UserId) -> Resul
         .ok_or(StoreError::NotFound("user"))
 }
 
-/// The active user of this name with the hash of the password, if they have one.
+/// The active user of this name, or of one that looks like it, with the hash of the password, if they have one.
 pub(crate) async fn find_with_password(
     connection: &mut SqliteConnection,
     name: &str,
 ) -> Result<Option<(UserId, String)>> {
-    let row = sqlx::query!(
-        r#"SELECT id, password AS "password!" FROM people
-           WHERE name = ? AND password IS NOT NULL AND left_at IS NULL"#,
+    // The name itself first: databases of earlier versions may have names that look alike.
+    let rows = sqlx::query!(
+        r#"SELECT id, name, password AS "password!" FROM people
+           WHERE password IS NOT NULL AND left_at IS NULL ORDER BY name = ? DESC, name"#,
         name
     )
-    .fetch_optional(connection)
+    .fetch_all(connection)
     .await?;
+    let skeleton = name_skeleton(name);
+    let row = rows
+        .into_iter()
+        .find(|row| name_skeleton(row.name.as_str()) == skeleton);
     Ok(row.map(|row| (row.id, row.password)))
 }
 
@@ -121,12 +126,21 @@ pub(crate) async fn invited(
     Ok(rows.into_iter().map(User::from).collect())
 }
 
-/// Adds a user. [`StoreError::UserNameTaken`] if the name exists, regardless of case.
+/// Adds a user. [`StoreError::UserNameTaken`] if a user has the name, or one that looks like it.
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,
     user: &User,
     password: Option<&str>,
 ) -> Result<()> {
+    let skeleton = name_skeleton(user.name.as_str());
+    let names = sqlx::query_scalar!("SELECT name FROM people");
+    let names = names.fetch_all(&mut *connection).await?;
+    if let Some(taken) = names
+        .into_iter()
+        .find(|name| name_skeleton(name.as_str()) == skeleton)
+    {
+        return Err(StoreError::UserNameTaken(taken.to_string()));
+    }
     sqlx::query!(
         "INSERT INTO people (id, name, team_id, joined_at, password, accepted_terms) VALUES (?, ?, ?, ?, ?, ?)",
         user.id,
@@ -137,10 +151,7 @@ pub(crate) async fn insert(
         user.accepted_terms,
     )
     .execute(connection)
-    .await
-    .map_err(StoreError::if_duplicate("people.name", || {
-        StoreError::UserNameTaken(user.name.to_string())
-    }))?;
+    .await?;
     Ok(())
 }
 

@@ -18,7 +18,8 @@ impl Address {
     /// # Errors
     /// If `server` is no address, its scheme is neither `http` nor `https`, or no certificate authority is available.
     pub(super) fn new(server: &str, ca_file: Option<&Path>) -> anyhow::Result<Self> {
-        let url = reqwest::Url::parse(server).with_context(|| {
+        let base = server_address(server);
+        let url = reqwest::Url::parse(&base).with_context(|| {
             format!(
                 "{:?} is not an address; expected e.g. https://faceoff.example.org or http://127.0.0.1:8080",
                 url_without_password(server)
@@ -32,10 +33,7 @@ impl Address {
                 url_without_password(server)
             ),
         };
-        Ok(Self {
-            base: server.trim_end_matches('/').to_owned(),
-            tls,
-        })
+        Ok(Self { base, tls })
     }
 
     /// An HTTP client that gives up after a silence of `read_timeout`.
@@ -58,8 +56,70 @@ impl Address {
     }
 }
 
+/// The address of a server without what people copy along with it: the path of a page, or a missing scheme.
+pub fn server_address(text: &str) -> String {
+    let text = text.trim().trim_matches(['<', '>', '"', '\'']);
+    let with_scheme = if text.contains("://") {
+        text.to_owned()
+    } else {
+        let host = text.split(['/', ':']).next().unwrap_or_default();
+        let scheme = if is_this_machine(host) {
+            "http"
+        } else {
+            "https"
+        };
+        format!("{scheme}://{text}")
+    };
+    match reqwest::Url::parse(&with_scheme) {
+        Ok(mut url) => {
+            url.set_path("");
+            url.set_query(None);
+            url.set_fragment(None);
+            url.as_str().trim_end_matches('/').to_owned()
+        }
+        // The caller reports the error.
+        Err(_) => text.to_owned(),
+    }
+}
+
 /// Whether a host of an address is this machine.
 pub fn is_this_machine(host: &str) -> bool {
     let address = host.trim_matches(['[', ']']).parse::<IpAddr>();
     host == "localhost" || address.is_ok_and(|address| address.is_loopback())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn server_address_is_found_in_every_form() {
+        for (text, address) in [
+            ("https://faceoff.example.org", "https://faceoff.example.org"),
+            (
+                "https://faceoff.example.org/",
+                "https://faceoff.example.org",
+            ),
+            (
+                "https://faceoff.example.org/board?stage=final#top",
+                "https://faceoff.example.org",
+            ),
+            (
+                " <https://Faceoff.Example.org> ",
+                "https://faceoff.example.org",
+            ),
+            ("faceoff.example.org", "https://faceoff.example.org"),
+            (
+                "faceoff.example.org:8443/board",
+                "https://faceoff.example.org:8443",
+            ),
+            ("localhost:8080", "http://localhost:8080"),
+            ("127.0.0.1:8080", "http://127.0.0.1:8080"),
+            ("http://[::1]:8080/", "http://[::1]:8080"),
+            ("https://größe.example", "https://xn--gre-6ka8i.example"),
+        ] {
+            assert_eq!(server_address(text), address, "{text:?}");
+        }
+        assert!(Address::new("no address", None).is_err());
+    }
 }

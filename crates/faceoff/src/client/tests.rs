@@ -62,6 +62,8 @@ async fn start_site(max_bundle_bytes: u64) -> Site {
     let config = HttpConfig {
         simulator: simulator(),
         max_bundle_bytes,
+        downloads: std::sync::Arc::default(),
+        source_url: None,
         public_url: None,
         upload_dir: folder.path().to_owned(),
         clock: Clock::new(now),

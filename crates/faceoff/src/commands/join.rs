@@ -8,12 +8,13 @@ use crate::{
 use anyhow::{Context, bail};
 use clap::Args;
 use faceoff_api::{
+    pasted::InvitationLink,
     requests::{FoundedTeam, JoinRequest},
     views::user::CallerView,
 };
 use faceoff_types::{DivisionName, TeamName, UserName};
 use serde::Serialize;
-use std::fs;
+use std::{fs, io::IsTerminal};
 
 /// Accepts an invitation and prints the new token, which is shown only once; with --sign-in, stores the token like
 /// faceoff login.
@@ -26,13 +27,17 @@ pub struct JoinCommand {
     server: Option<String>,
     #[command(flatten)]
     ca: CaFile,
-    /// Your name, for signing in and for lists: 1 to 40 letters, digits, spaces and . _ -; not with a link that
+    /// Your name, for signing in and for lists: 1 to 40 letters and digits of any script, spaces and . _ - ' & + ·; not with a link that
     /// restores an account
     #[arg(long)]
     name: Option<UserName>,
-    /// Read a password of 12 or more characters from standard input; without a password, you sign in with tokens only
+    /// Read a password of 12 or more characters from standard input instead of prompting at the terminal; without a
+    /// password, you sign in with tokens only
     #[arg(long)]
     password_stdin: bool,
+    /// Set no password and do not prompt for one
+    #[arg(long, conflicts_with = "password_stdin")]
+    no_password: bool,
     /// The version of the terms that you accept, if the season has terms
     #[arg(long, value_name = "VERSION")]
     accept_terms: Option<u32>,
@@ -56,27 +61,24 @@ pub struct JoinCommand {
     json: bool,
 }
 
-/// Splits a link into server and code; accepts a code alone, too.
-fn parse_link(link: &str) -> anyhow::Result<(Option<&str>, &str)> {
-    let (server, code) = match link.split_once("/join/") {
-        Some(("", code)) => (None, code),
-        Some((server, code)) => (Some(server), code),
-        None => (None, link),
-    };
-    let code = code.trim().trim_end_matches('/');
-    if !code.starts_with("fo_invite_") {
-        bail!(
-            "expected a link like https://…/join/fo_invite_…, or the code at its end, got {link:?}"
-        );
-    }
-    Ok((server, code))
-}
-
 /// Output of `--sign-in --json`: everything but the token.
 #[derive(Debug, Serialize)]
 struct SignedIn<'a> {
     #[serde(flatten)]
     caller: &'a CallerView,
+}
+
+/// Prompts for a new password; `None` if the user enters none.
+fn prompt_password() -> anyhow::Result<Option<String>> {
+    let question = "password, 12 or more characters (empty: sign in with tokens only): ";
+    let password = password::prompt(question, "")?;
+    if password.is_empty() {
+        return Ok(None);
+    }
+    if password::prompt("repeat the password: ", "")? != password {
+        bail!("the passwords differ; the invitation can still be used");
+    }
+    Ok(Some(password))
 }
 
 impl JoinCommand {
@@ -85,17 +87,25 @@ impl JoinCommand {
     /// # Errors
     /// If the server cannot be reached or refuses.
     pub fn run(self) -> anyhow::Result<()> {
-        let (link_server, code) = parse_link(&self.link)?;
+        let link = InvitationLink::find(&self.link).with_context(|| {
+            format!(
+                "expected a link like https://…/join/fo_invite_…, or the code at its end, got {:?}",
+                self.link
+            )
+        })?;
         // The server in the link has priority over --server and FACEOFF_SERVER.
-        let server = link_server.or(self.server.as_deref());
+        let server = link.server.as_deref().or(self.server.as_deref());
         let server = server.unwrap_or(DEFAULT_SERVER);
         let client = Client::new(server, None, self.ca.path())?;
-        let password = match self.password_stdin {
-            true => Some(password::read_stdin()?),
-            false => None,
+        let password = if self.password_stdin {
+            Some(password::read_stdin()?)
+        } else if self.no_password || !std::io::stdin().is_terminal() {
+            None
+        } else {
+            prompt_password()?
         };
         let join = JoinRequest {
-            code: code.to_owned(),
+            code: link.code.clone(),
             name: self.name,
             password,
             team: self.team.map(|name| FoundedTeam {
@@ -154,22 +164,5 @@ impl JoinCommand {
                 )
             })
         })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn link_and_code_are_both_accepted() {
-        let code = "fo_invite_abc";
-        assert_eq!(parse_link(code).unwrap(), (None, code));
-        assert_eq!(parse_link("/join/fo_invite_abc").unwrap(), (None, code));
-        let whole = parse_link("https://faceoff.example.org/join/fo_invite_abc\n").unwrap();
-        assert_eq!(whole, (Some("https://faceoff.example.org"), code));
-        for wrong in ["", "https://faceoff.example.org/", "fo_team_abc"] {
-            assert!(parse_link(wrong).is_err(), "{wrong}");
-        }
     }
 }

@@ -7,7 +7,7 @@ use crate::{
 };
 use anyhow::{Context, ensure};
 use clap::Args;
-use faceoff_api::{requests::NewToken, views::user::CallerView};
+use faceoff_api::{pasted::secret_in, requests::NewToken, views::user::CallerView};
 use serde::Serialize;
 use std::{
     fs,
@@ -93,14 +93,13 @@ impl LoginCommand {
                 };
                 create_token(&client, &name, &password).await?
             }
-            None if self.token_stdin => password::read_stdin()?.trim().to_owned(),
+            None if self.token_stdin => password::read_stdin()?,
             None => password::prompt(
                 "token (or sign in with --name NAME): ",
                 "use --token-stdin and pass the token as standard input, or --name NAME --password-stdin",
-            )?
-            .trim()
-            .to_owned(),
+            )?,
         };
+        let token = secret_in(&token).to_owned();
         ensure!(
             !token.is_empty(),
             "expected a token, which begins with fo_; without one, accept an invitation (faceoff join LINK), or sign in with --name"

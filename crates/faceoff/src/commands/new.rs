@@ -7,9 +7,10 @@ use super::output::print;
 use anyhow::{Context, ensure};
 use clap::{Args, ValueEnum};
 use example::Example;
+use flate2::{Compression, GzBuilder};
 use serde_json::json;
 use std::{
-    fs,
+    fs, io,
     path::{Path, PathBuf},
 };
 
@@ -52,19 +53,11 @@ impl NewCommand {
             "{} already exists; choose another name, or remove it first",
             self.folder.display()
         );
-        let files = match self.lang {
-            Language::Python => templates::python(self.example),
-            Language::Rust => templates::rust(self.example),
-        };
         let mut written = Vec::new();
-        for (path, text) in files {
+        for (path, text) in agent_files(self.lang, self.example, name) {
             let path = self.folder.join(path);
             let parent = path.parent().unwrap_or(&self.folder);
             fs::create_dir_all(parent).with_context(|| format!("creating {}", parent.display()))?;
-            let text = text
-                .replace("{{name}}", name)
-                .replace("{{task}}", self.example.task())
-                .replace("{{version}}", env!("CARGO_PKG_VERSION"));
             fs::write(&path, text).with_context(|| format!("writing {}", path.display()))?;
             written.push(path);
         }
@@ -84,6 +77,77 @@ impl NewCommand {
             )
         })
     }
+}
+
+/// The files of a new agent: paths and texts.
+fn agent_files(
+    language: Language,
+    example: Example,
+    name: &str,
+) -> impl Iterator<Item = (&'static str, String)> {
+    let files = match language {
+        Language::Python => templates::python(example),
+        Language::Rust => templates::rust(example),
+    };
+    files.into_iter().map(move |(path, text)| {
+        let text = text
+            .replace("{{name}}", name)
+            .replace("{{task}}", example.task())
+            .replace("{{version}}", env!("CARGO_PKG_VERSION"));
+        (path, text)
+    })
+}
+
+/// The examples as archives: file name, content, and the bytes of a .tar.gz with one folder.
+///
+/// # Errors
+/// Never on a working machine: the archives are made in memory.
+pub(super) fn example_archives() -> io::Result<Vec<(&'static str, &'static str, Vec<u8>)>> {
+    const NAME: &str = "my-agent";
+    let archive = |language, example| {
+        let files = agent_files(language, example, NAME);
+        tar_gz(files.map(|(path, text)| (format!("{NAME}/{path}"), text)))
+    };
+    Ok(vec![
+        (
+            "agent-python-defender.tar.gz",
+            "An agent in Python that stops pucks, with its tests",
+            archive(Language::Python, Example::Defender)?,
+        ),
+        (
+            "agent-python-hitter.tar.gz",
+            "An agent in Python that shoots at the goal, with its tests",
+            archive(Language::Python, Example::Hitter)?,
+        ),
+        (
+            "agent-rust-defender.tar.gz",
+            "An agent in Rust that stops pucks, with its tests",
+            archive(Language::Rust, Example::Defender)?,
+        ),
+        (
+            "agent-rust-hitter.tar.gz",
+            "An agent in Rust that shoots at the goal, with its tests",
+            archive(Language::Rust, Example::Hitter)?,
+        ),
+        (
+            "runtime-python3-ml.tar.gz",
+            "A script that builds the runtime python3-ml, with the versions of its packages",
+            tar_gz(templates::machine_learning_runtime().into_iter())?,
+        ),
+    ])
+}
+
+fn tar_gz(files: impl Iterator<Item = (String, String)>) -> io::Result<Vec<u8>> {
+    let gzip = GzBuilder::new().write(Vec::new(), Compression::default());
+    let mut archive = tar::Builder::new(gzip);
+    for (path, text) in files {
+        let mut header = tar::Header::new_gnu();
+        header.set_mtime(0);
+        header.set_mode(if path.ends_with(".sh") { 0o755 } else { 0o644 });
+        header.set_size(text.len() as u64);
+        archive.append_data(&mut header, path, text.as_bytes())?;
+    }
+    archive.into_inner()?.finish()
 }
 
 /// The last part of the path, if it is a valid name in both languages and on the board.

@@ -4,6 +4,7 @@
 mod archived_season;
 mod clock;
 mod data_folder;
+mod downloads;
 mod http;
 mod live_season;
 mod monitoring;

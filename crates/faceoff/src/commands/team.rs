@@ -30,7 +30,7 @@ enum Action {
     Show,
     /// Change the team's name or profile; options that are left out do not change
     Change {
-        /// The new name: 1 to 40 letters, digits, spaces and . _ -
+        /// The new name: 1 to 40 letters and digits of any script, spaces and . _ - ' & + ·
         #[arg(long, value_name = "NAME")]
         rename: Option<TeamName>,
         /// The team's affiliation; empty: none

@@ -73,6 +73,7 @@ impl Config {
     pub(super) fn check(&self) -> anyhow::Result<()> {
         self.nats.check()?;
         self.check_public_url()?;
+        self.check_source_url()?;
         let header = &self.connections.forwarded_header;
         ensure!(
             HeaderName::from_str(header).is_ok(),
@@ -112,6 +113,18 @@ impl Config {
             "server.public_url: expected an address like https://faceoff.example.org, without a path, a trailing slash \
             and a password, got {:?}",
             url_without_password(url)
+        );
+        Ok(())
+    }
+
+    fn check_source_url(&self) -> anyhow::Result<()> {
+        let Some(url) = &self.server.source_url else {
+            return Ok(());
+        };
+        let parsed = reqwest::Url::parse(url);
+        ensure!(
+            parsed.is_ok_and(|url| matches!(url.scheme(), "http" | "https")),
+            "server.source_url: expected an address like https://git.example.org/faceoff, got {url:?}"
         );
         Ok(())
     }

@@ -92,6 +92,8 @@ async fn start_site() -> Site {
     let config = HttpConfig {
         simulator: faceoff_airhockey::simulator(),
         max_bundle_bytes: 64,
+        downloads: std::sync::Arc::default(),
+        source_url: None,
         public_url: None,
         upload_dir: folder.path().to_owned(),
         clock: Clock::new(now),

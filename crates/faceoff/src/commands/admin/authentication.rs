@@ -2,7 +2,7 @@
 //! data folder when it first starts.
 
 use crate::{
-    client::{Client, is_this_machine},
+    client::{Client, is_this_machine, server_address},
     commands::{
         serve::ADMIN_TOKEN_FILE,
         server::{Connection, Source},
@@ -69,7 +69,7 @@ fn configured_server(mut listen: SocketAddr) -> String {
 
 /// The server is on this machine.
 fn is_local(server: &str) -> bool {
-    let host = reqwest::Url::parse(server)
+    let host = reqwest::Url::parse(&server_address(server))
         .ok()
         .and_then(|url| url.host_str().map(str::to_owned));
     host.is_some_and(|host| is_this_machine(&host))

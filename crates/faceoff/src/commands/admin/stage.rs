@@ -32,7 +32,7 @@ pub(super) enum StageAction {
     },
     /// Create a stage; options that are left out are copied from the open stage
     Create {
-        /// 1 to 40 letters, digits, spaces and . _ -
+        /// 1 to 40 letters and digits of any script, spaces and . _ - ' & + ·
         name: String,
         #[command(flatten)]
         options: Box<StageOptions>,

@@ -21,7 +21,7 @@ use faceoff_types::{DivisionName, TeamName};
 pub(super) enum TeamAction {
     /// Create a team and print its token, which is shown only once
     CreateTeam {
-        /// 1 to 40 letters, digits, spaces and . _ -
+        /// 1 to 40 letters and digits of any script, spaces and . _ - ' & + ·
         name: String,
     },
     /// Change a team's name or division, or make it a baseline

@@ -24,7 +24,7 @@ pub(super) enum TournamentAction {
     /// Open a tournament. Until its first round starts, teams and rules may change, and friendly and test games are
     /// possible
     Open {
-        /// 1 to 40 letters, digits, spaces and . _ -
+        /// 1 to 40 letters and digits of any script, spaces and . _ - ' & + ·
         name: String,
         /// The stage whose board ranks the teams [default: the open stage, or the nearest]
         #[arg(long, value_name = "STAGE")]

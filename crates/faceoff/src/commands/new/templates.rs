@@ -22,6 +22,25 @@ macro_rules! crate_source {
     };
 }
 
+/// The script that builds the runtime `python3-ml`, and its files.
+pub fn machine_learning_runtime() -> [(String, String); 3] {
+    [
+        (
+            "runtime-python3-ml/runtime.sh",
+            crate_source!("../docker/runtime.sh"),
+        ),
+        (
+            "runtime-python3-ml/python3-ml/requirements.txt",
+            crate_source!("../docker/python3-ml/requirements.txt"),
+        ),
+        (
+            "runtime-python3-ml/python3-ml/faceoff_threads.py",
+            crate_source!("../docker/python3-ml/faceoff_threads.py"),
+        ),
+    ]
+    .map(|(path, text)| (path.to_owned(), text.to_owned()))
+}
+
 pub fn python(example: Example) -> Files {
     let agent = match example {
         Example::Defender => template!("python/defender.py"),

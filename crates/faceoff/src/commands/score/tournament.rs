@@ -252,7 +252,7 @@ mod tests {
             ("Zed=0", "round: expected 1 to 100, got 0"),
             (
                 "<b>=1",
-                "a team name has letters, digits, spaces and . _ - only, not '<'",
+                "a team name has letters and digits of any script, spaces and . _ - ' & + · only, not '<'",
             ),
         ] {
             assert_eq!(text.parse::<TeamAndRound>().unwrap_err(), expected);

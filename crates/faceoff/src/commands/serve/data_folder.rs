@@ -149,14 +149,25 @@ fn is_alive(id: i32) -> bool {
     Pid::from_raw(id).is_some_and(|id| test_kill_process(id) != Err(Errno::SRCH))
 }
 
-/// Creates an empty private folder, or empties it.
+/// Creates an empty private folder, or removes everything in it but the entry `kept`.
 ///
 /// # Errors
 /// If the folder cannot be emptied or created.
-pub fn empty_folder(folder: &Path) -> anyhow::Result<()> {
-    allow_missing(fs::remove_dir_all(folder))
-        .with_context(|| format!("emptying {}", folder.display()))?;
-    create_private(folder)
+pub fn empty_folder_except(folder: &Path, kept: &str) -> anyhow::Result<()> {
+    create_private(folder)?;
+    let emptied = fs::read_dir(folder).and_then(|mut entries| {
+        entries.try_for_each(|entry| {
+            let entry = entry?;
+            if entry.file_name() == kept {
+                Ok(())
+            } else if entry.file_type()?.is_dir() {
+                fs::remove_dir_all(entry.path())
+            } else {
+                fs::remove_file(entry.path())
+            }
+        })
+    });
+    emptied.with_context(|| format!("emptying {}", folder.display()))
 }
 
 /// The hash of the host's token, which is created at the first start.

@@ -2,12 +2,17 @@
 
 use super::{
     clock::server_clock,
-    data_folder::{close_to_others, empty_folder, load_or_create_link_key, lock, set_admin_token},
+    data_folder::{
+        close_to_others, empty_folder_except, load_or_create_link_key, lock, set_admin_token,
+    },
+    downloads::downloads,
 };
 use crate::competition::{competition, simulator};
 use crate::{config::Config, machine};
 use anyhow::{Context, anyhow};
-use faceoff_http::{AgentResources, Capacity, HttpConfig, LinkKey};
+use faceoff_http::{
+    AgentResources, Capacity, Downloads, HttpConfig, LinkKey, PARTIAL_UPLOADS_FOLDER,
+};
 use faceoff_metrics::Metrics;
 use faceoff_store::{FreeSpace, Store};
 use faceoff_types::Clock;
@@ -16,6 +21,7 @@ use std::{
     io::Write as _,
     net::SocketAddr,
     path::{Path, PathBuf},
+    sync::Arc,
 };
 use tokio::net::TcpListener;
 
@@ -26,6 +32,7 @@ pub(super) struct Site {
     pub(super) link_key: LinkKey,
     pub(super) clock: Clock,
     upload_dir: PathBuf,
+    downloads: Arc<Downloads>,
     /// Held as long as the season is served.
     _lock: File,
 }
@@ -41,8 +48,8 @@ impl Site {
         let lock = lock(data_dir)?;
         let upload_dir = data_dir.join("uploads");
         // A process that was killed may have left half-uploaded files, which belong to no submission, or an archive that a
-        // visitor was downloading.
-        empty_folder(&upload_dir)?;
+        // visitor was downloading. Uploads in parts go on after a restart.
+        empty_folder_except(&upload_dir, PARTIAL_UPLOADS_FOLDER)?;
         let store = open_store(data_dir)
             .await?
             .with_free_space(FreeSpace::new(disks, config.server.min_free_bytes));
@@ -66,6 +73,7 @@ impl Site {
             link_key: load_or_create_link_key(data_dir)?,
             clock,
             upload_dir,
+            downloads: Arc::new(downloads(config.server.downloads_dir.as_deref())?),
             _lock: lock,
         })
     }
@@ -81,6 +89,8 @@ impl Site {
         HttpConfig {
             simulator: simulator(),
             max_bundle_bytes: config.bundle.packed_bytes,
+            downloads: self.downloads.clone(),
+            source_url: config.server.source_url.clone(),
             public_url: config.server.public_url.clone(),
             upload_dir: self.upload_dir.clone(),
             clock,
