@@ -44,6 +44,7 @@ pub mod restore;
 pub mod runtimes;
 pub mod score;
 pub mod season;
+mod series_folders;
 pub mod serve;
 mod server;
 pub mod sim;

@@ -10,6 +10,7 @@ mod series;
 mod series_results;
 mod table;
 
+use super::series_folders;
 use anyhow::{Context, bail};
 use bar::Bar;
 use clap::Args;
@@ -56,7 +57,7 @@ impl PlayCommand {
                 out.display()
             );
         }
-        if let Some(earlier) = series::find_earlier(out) {
+        if let Some(earlier) = series_folders::find_first(out) {
             bail!(
                 "{} contains the recordings of an earlier series: name another folder with --out, or remove it",
                 earlier.display()

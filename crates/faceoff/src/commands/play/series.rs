@@ -9,21 +9,13 @@ use super::{
     series_results::{Series, SeriesGame, SeriesKind, SeriesResults},
     table,
 };
+use crate::commands::series_folders;
 use anyhow::Context;
 use faceoff_dataset::game::GAME_FILE;
 use faceoff_runner::{GameReport, PlatformFault};
-use std::path::{Path, PathBuf};
 
 /// Attempts per game; after that many failures on a busy host, the series ends.
 const MAX_ATTEMPTS: u32 = 5;
-
-/// A recording of an earlier series in a folder.
-pub(super) fn find_earlier(out: &Path) -> Option<PathBuf> {
-    ["pair-1", "game-1"]
-        .map(|name| out.join(name))
-        .into_iter()
-        .find(|path| path.exists())
-}
 
 /// Plays the series. Results are printed and written after each pair or game, so that an interrupted series has some,
 /// too.
@@ -60,12 +52,12 @@ pub(super) fn play(
                 SeriesKind::MirroredPairs => (
                     options.seed.derive("pair", &number.to_le_bytes()),
                     *swapped,
-                    format!("pair-{number}/half-{half}"),
+                    series_folders::of_half(number, half),
                 ),
                 SeriesKind::Games => (
                     options.seed.derive("game", &number.to_le_bytes()),
                     number % 2 == 0,
-                    format!("game-{number}"),
+                    series_folders::of_game(number),
                 ),
             };
             bar.start_game(&folder, finished_steps, total_steps);
