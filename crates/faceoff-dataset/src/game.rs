@@ -3,6 +3,7 @@
 
 mod archive;
 mod conditions;
+mod course;
 mod files;
 mod rallies;
 mod recorded_inputs;
@@ -12,11 +13,14 @@ mod replay;
 mod rows;
 mod table;
 mod verify;
+mod violations;
 
 pub use archive::{GameArchives, RecordedGame, remove_game};
 pub use conditions::game_arena;
+pub use course::{GameCourse, GamePositions, SideCourse};
 pub use files::{GAME_FILE, GAME_FILES, side_file};
 pub use rallies::ListedRally;
 pub use recorder::GameRecorder;
 pub use recording::GameRecording;
 pub use verify::{VerifiedGame, verify_game};
+pub use violations::Violation;

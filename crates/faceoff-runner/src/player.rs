@@ -147,7 +147,8 @@ impl<'a> Player<'a> {
     }
 
     /// Runs one episode of at most `max_steps` control steps. Repeats it while host interference ends it and the limits
-    /// of reruns allow it; the last try counts. `cancelled` is called before each step.
+    /// of reruns allow it; the last try counts. `cancelled` is called before each reset and each step, when the agent has
+    /// answered `hello`.
     ///
     /// # Errors
     /// Platform faults only; an agent fault is an outcome.
@@ -285,6 +286,9 @@ impl<'a> Player<'a> {
         running: &mut DynEpisode<'_>,
         cancelled: &dyn Fn() -> bool,
     ) -> Result<EpisodeOutcome, (Phase, SessionError)> {
+        if cancelled() {
+            return Err((Phase::Reset, PlatformFault::Cancelled.into()));
+        }
         self.reset(session, episode)
             .map_err(|error| (Phase::Reset, error))?;
         self.play_steps(session, running, cancelled)

@@ -22,9 +22,9 @@ pub trait Observer {
     /// The end of the agent's standard error with its faults. Called exactly once, even if there is no report because
     /// the shard was cancelled or the platform failed.
     fn log(&mut self, _log: &str) {}
-    /// The agent has answered the announcement of an episode. Called before each step, so it must be cheap.
+    /// The agent has answered `hello`. Called before each reset and each step, so it must be cheap.
     fn on_answer(&self) {}
-    /// Should the shard stop? Called before each step, so it must be cheap.
+    /// Should the shard stop? Called before each reset and each step, so it must be cheap.
     fn cancelled(&self) -> bool;
 }
 

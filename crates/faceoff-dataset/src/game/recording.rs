@@ -22,12 +22,12 @@ use faceoff_wire::{
 use fs_err as fs;
 use serde::Deserialize;
 use std::{
-    collections::BTreeSet,
+    collections::{BTreeMap, BTreeSet},
     path::{Path, PathBuf},
 };
 
 /// All files of a recording except its manifest.
-const FILES: [&str; 11] = [
+pub(super) const FILES: [&str; 11] = [
     MOTION_FILE,
     RALLIES_FILE,
     steps_file(Side::First),
@@ -90,33 +90,9 @@ impl GameRecording {
     /// # Errors
     /// [`DatasetError`].
     pub fn open(path: &Path) -> Result<Self, DatasetError> {
-        let (path, container) = if !fs::metadata(path)?.is_dir() {
-            (path.to_owned(), Container::archive(path)?)
-        } else if path.join(MANIFEST_FILE).exists() {
-            (path.to_owned(), Container::Folder(path.to_owned()))
-        } else {
-            let archive = path.join(GAME_FILE);
-            let container = Container::archive(&archive)?;
-            container.check_results_copy(&path.join(RESULTS_FILE), GAME_FILE)?;
-            (archive, container)
-        };
+        let (path, container) = locate(path)?;
         let manifest = read_manifest(&container)?;
-        let listed: BTreeSet<&str> = manifest.files.keys().map(String::as_str).collect();
-        if listed != BTreeSet::from(FILES) {
-            return Err(DatasetError::Altered(format!(
-                "{MANIFEST_FILE} lists {listed:?}, expected {FILES:?}"
-            )));
-        }
-        container.expect_only(&FILES)?;
-        for (name, listed) in &manifest.files {
-            let found = container.digest(name)?;
-            if found != *listed {
-                return Err(DatasetError::Altered(format!(
-                    "{name} has {} bytes and BLAKE3 {}, {MANIFEST_FILE} says {} bytes and {}",
-                    found.bytes, found.blake3, listed.bytes, listed.blake3
-                )));
-            }
-        }
+        check_files(&container, &manifest.files, &FILES)?;
         Ok(Self {
             path,
             container,
@@ -172,12 +148,55 @@ impl GameRecording {
     }
 }
 
+/// Finds the files of a game: an archive, an unpacked folder, or the `game.zip` in a folder.
+pub(super) fn locate(path: &Path) -> Result<(PathBuf, Container), DatasetError> {
+    if !fs::metadata(path)?.is_dir() {
+        return Ok((path.to_owned(), Container::archive(path)?));
+    }
+    if path.join(MANIFEST_FILE).exists() {
+        return Ok((path.to_owned(), Container::Folder(path.to_owned())));
+    }
+    let archive = path.join(GAME_FILE);
+    let container = Container::archive(&archive)?;
+    container.check_results_copy(&path.join(RESULTS_FILE), GAME_FILE)?;
+    Ok((archive, container))
+}
+
+/// Checks that the manifest lists the expected files, and compares each with its hash.
+pub(super) fn check_files(
+    container: &Container,
+    files: &BTreeMap<String, FileDigest>,
+    expected: &[&str],
+) -> Result<(), DatasetError> {
+    let listed: BTreeSet<&str> = files.keys().map(String::as_str).collect();
+    if listed != expected.iter().copied().collect() {
+        return Err(DatasetError::Altered(format!(
+            "{MANIFEST_FILE} lists {listed:?}, expected {expected:?}"
+        )));
+    }
+    container.expect_only(expected)?;
+    for (name, listed) in files {
+        let found = container.digest(name)?;
+        if found != *listed {
+            return Err(DatasetError::Altered(format!(
+                "{name} has {} bytes and BLAKE3 {}, {MANIFEST_FILE} says {} bytes and {}",
+                found.bytes, found.blake3, listed.bytes, listed.blake3
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// The layout that a manifest states. It is read first: a manifest of another layout may lack fields.
+pub(super) fn read_schema(manifest: &[u8]) -> Result<String, DatasetError> {
+    let ManifestSchema { schema } =
+        serde_json::from_slice(manifest).map_err(DatasetError::unreadable(MANIFEST_FILE))?;
+    Ok(schema)
+}
+
 fn read_manifest(container: &Container) -> Result<GameManifest, DatasetError> {
     let bytes = container.bytes(MANIFEST_FILE)?;
-    // Check the layout first: a manifest of another layout may lack fields.
-    let ManifestSchema { schema } =
-        serde_json::from_slice(&bytes).map_err(DatasetError::unreadable(MANIFEST_FILE))?;
-    match schema.as_str() {
+    match read_schema(&bytes)?.as_str() {
         GAME_SCHEMA => {
             serde_json::from_slice(&bytes).map_err(DatasetError::unreadable(MANIFEST_FILE))
         }

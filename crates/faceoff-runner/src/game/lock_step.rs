@@ -2,12 +2,12 @@
 //! the measured time of the other. If both share CPUs, a side that has answered is frozen until its next
 //! question, because it would otherwise compute in the other's time.
 
-use super::side_player::SidePlayer;
+use super::side_player::{SidePlayer, StartResult};
 use crate::{calibration::Calibration, fault::PlatformFault, session::Session};
 use faceoff_airhockey::{GameSink, RunningGame};
 use faceoff_episode::Question;
 use faceoff_sandbox::{Layer, SandboxError};
-use faceoff_types::{Side, TimeLimits};
+use faceoff_types::{AgentFault, AgentTask, Side, TimeLimits};
 use std::time::{Duration, Instant};
 
 /// If handling one side takes longer than this, the time counts as *absence* of the evaluator for the other side, which is not charged
@@ -23,21 +23,26 @@ pub(super) enum AfterAnswer {
     Freeze,
 }
 
-/// Runs a game to its end; `cancelled` is called before each step.
-pub(super) fn play<S: GameSink>(
+/// A sink that also learns of the agents' starts, and can stop the game.
+pub(super) trait ControllingSink: GameSink {
+    /// An agent was started: it has answered `hello`, or had this fault.
+    fn on_start(&mut self, side: Side, fault: Option<&AgentFault>);
+    /// Should the game stop? Called after each start and before each step.
+    fn cancelled(&self) -> bool;
+}
+
+/// Runs a game to its end, or until its sink stops it.
+pub(super) fn play<S: ControllingSink>(
     game: &mut RunningGame<S>,
     sides: &mut [SidePlayer<'_>; 2],
     calibrations: &mut [Calibration; 2],
     after_answer: AfterAnswer,
-    cancelled: impl Fn(&mut S) -> bool,
 ) -> Result<(), PlatformFault> {
     while game.end().is_none() {
         start_rally(game, sides, after_answer)?;
         let (rally, mut steps) = (game.rally(), 0);
         while game.is_in_rally() {
-            if cancelled(game.sink()) {
-                return Err(PlatformFault::Cancelled);
-            }
+            check_cancelled(game)?;
             step(game, sides, after_answer)?;
             steps += 1;
         }
@@ -56,7 +61,7 @@ pub(super) fn play<S: GameSink>(
 }
 
 /// Starts the agents that are not running, announces the rally to both sides, and begins it.
-fn start_rally<S: GameSink>(
+fn start_rally<S: ControllingSink>(
     game: &mut RunningGame<S>,
     sides: &mut [SidePlayer<'_>; 2],
     after_answer: AfterAnswer,
@@ -65,8 +70,10 @@ fn start_rally<S: GameSink>(
     let [first, second] = sides;
     freeze_idle(second, after_answer);
     let first_start = first.start()?;
+    report_start(game, Side::First, &first_start)?;
     freeze_idle(first, after_answer);
     let second_start = second.start()?;
+    report_start(game, Side::Second, &second_start)?;
     if after_answer == AfterAnswer::Freeze && !(first.can_freeze() && second.can_freeze()) {
         return Err(missing_freezer_error().into());
     }
@@ -82,6 +89,37 @@ fn start_rally<S: GameSink>(
     game.start_rally(entries)?;
     kill_faulty_agents(game, sides);
     Ok(())
+}
+
+/// Reports a start, after which the sink may stop the game.
+fn report_start<S: ControllingSink>(
+    game: &mut RunningGame<S>,
+    side: Side,
+    start: &StartResult,
+) -> Result<(), PlatformFault> {
+    match start {
+        StartResult::Ready { startup_s: None } => return Ok(()),
+        StartResult::Ready { startup_s: Some(_) } => game.sink().on_start(side, None),
+        StartResult::Failed { fault, .. } => {
+            let fault = AgentFault {
+                fault: fault.kind.clone(),
+                agent_task: AgentTask::Game { side },
+                episode: None,
+                step: None,
+                line: fault.line.clone(),
+            };
+            game.sink().on_start(side, Some(&fault));
+        }
+    }
+    check_cancelled(game)
+}
+
+fn check_cancelled<S: ControllingSink>(game: &mut RunningGame<S>) -> Result<(), PlatformFault> {
+    if game.sink().cancelled() {
+        Err(PlatformFault::Cancelled)
+    } else {
+        Ok(())
+    }
 }
 
 /// Freezes a side without a pending question until its next question.

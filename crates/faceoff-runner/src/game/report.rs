@@ -1,7 +1,7 @@
 //! Runs a whole game, records it, and reports its result.
 
 use super::{
-    lock_step::{self, AfterAnswer},
+    lock_step::{self, AfterAnswer, ControllingSink},
     side_player::SidePlayer,
 };
 use crate::{
@@ -15,12 +15,14 @@ use faceoff_airhockey::{FinishedGame, GameSink, GameStepRow, RallyRow, RallyStar
 use faceoff_dataset::game::{GameArchives, GameRecorder, RecordedGame, game_arena, remove_game};
 use faceoff_episode::RecordError;
 use faceoff_sandbox::affinity::AffinityGuard;
-use faceoff_types::Side;
+use faceoff_types::{AgentFault, Side};
 use faceoff_wire::game::{GameCalibration, GameSpec};
 use std::{fs, path::Path};
 
 /// Observes a running game, and can stop it.
 pub trait GameObserver {
+    /// A side's agent was started, for the first time or after a fault: it has answered `hello`, or had this fault.
+    fn on_start(&mut self, _side: Side, _fault: Option<&AgentFault>) {}
     fn on_rally_start(&mut self, _start: &RallyStart<'_>) {}
     /// A control step was simulated. Called for every step, so it must be cheap.
     fn on_step(&mut self, _row: &GameStepRow<'_>) {}
@@ -29,7 +31,7 @@ pub trait GameObserver {
     /// The end of an agent's standard error with its faults. Called exactly once for each side, even if there is no
     /// report because the game was cancelled or the platform failed.
     fn log(&mut self, _side: Side, _log: &str) {}
-    /// Should the game stop? Called before each step, so it must be cheap.
+    /// Should the game stop? Called after each start and before each step, so it must be cheap.
     fn cancelled(&self) -> bool;
 }
 
@@ -160,13 +162,7 @@ pub fn play_game<S: GameSink>(
         } else {
             AfterAnswer::Continue
         };
-    let played = lock_step::play(
-        &mut game,
-        &mut sides,
-        &mut calibrations,
-        after_answer,
-        |observed| observed.observer.cancelled(),
-    );
+    let played = lock_step::play(&mut game, &mut sides, &mut calibrations, after_answer);
     let finished = played.map(|()| {
         let FinishedGame {
             outcome,
@@ -219,5 +215,15 @@ impl<S: GameSink> GameSink for ObservedSink<'_, S> {
         self.sink.end_rally(row)?;
         self.observer.on_rally_end(row);
         Ok(())
+    }
+}
+
+impl<S: GameSink> ControllingSink for ObservedSink<'_, S> {
+    fn on_start(&mut self, side: Side, fault: Option<&AgentFault>) {
+        self.observer.on_start(side, fault);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.observer.cancelled()
     }
 }

@@ -7,8 +7,8 @@ use faceoff_runner::{
     AgentEnvironment, GameObserver, GameReport, GameSpec, PlatformFault, run_game,
 };
 use faceoff_types::{
-    AgentFaultKind, ForfeitCause, GameEnd, GameLimits, GameOutcome, Phase, Seed, Side, SideOutcome,
-    ViolationName,
+    AgentFault, AgentFaultKind, ForfeitCause, GameEnd, GameLimits, GameOutcome, Phase, Seed, Side,
+    SideOutcome, ViolationName,
 };
 use std::{cell::Cell, fs, path::Path};
 
@@ -423,14 +423,17 @@ fn diagnosis_of_one_side_is_not_on_the_others_clock() {
 
 #[test]
 fn cancelled_game_leaves_logs_and_no_recording() {
-    /// Cancels the game at its fourth step.
+    /// Cancels the game after its third step.
     struct CancellingObserver {
-        checks: Cell<u32>,
+        starts: Vec<(Side, bool)>,
         logs: Vec<(Side, String)>,
         rallies: u32,
         steps: u32,
     }
     impl GameObserver for CancellingObserver {
+        fn on_start(&mut self, side: Side, fault: Option<&AgentFault>) {
+            self.starts.push((side, fault.is_none()));
+        }
         fn on_rally_start(&mut self, _: &faceoff_airhockey::RallyStart<'_>) {
             self.rallies += 1;
         }
@@ -441,13 +444,12 @@ fn cancelled_game_leaves_logs_and_no_recording() {
             self.logs.push((side, log.to_owned()));
         }
         fn cancelled(&self) -> bool {
-            self.checks.set(self.checks.get() + 1);
-            self.checks.get() == 4
+            self.steps == 3
         }
     }
     let agent = Agent::with("def on_reset(episode): print('reset', file=sys.stderr, flush=True)");
     let mut observer = CancellingObserver {
-        checks: Cell::new(0),
+        starts: Vec::new(),
         logs: Vec::new(),
         rallies: 0,
         steps: 0,
@@ -458,6 +460,7 @@ fn cancelled_game_leaves_logs_and_no_recording() {
     let stopped = run_game(&spec(100), bundles, [&env; 2], out.path(), &mut observer);
     assert!(matches!(stopped, Err(PlatformFault::Cancelled)));
     assert_eq!((observer.rallies, observer.steps), (1, 3));
+    assert_eq!(observer.starts, Side::BOTH.map(|side| (side, true)));
     let expected = Side::BOTH.map(|side| (side, "reset\n".to_owned()));
     assert_eq!(observer.logs, expected);
     assert_eq!(fs::read_dir(out.path()).unwrap().count(), 0);

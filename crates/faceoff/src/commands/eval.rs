@@ -5,14 +5,13 @@ mod ablation;
 mod differences;
 mod files;
 mod logs;
-mod notes;
 mod pool;
 mod profile_run;
 mod seeds;
 mod server_stage;
 mod table;
 
-use super::{ca_file::CaFile, local_bundle, output::print};
+use super::{ca_file::CaFile, local_bundle, notes::Notes, output::print};
 use crate::competition::{competition, parse_profile, parse_task};
 use crate::config::Config;
 use anyhow::{Context, ensure};
@@ -25,7 +24,6 @@ use faceoff_types::{
 };
 use faceoff_worker::CpuLayout;
 use files::RESULTS;
-use notes::Notes;
 use profile_run::EvalSetup;
 use seeds::NamedSeed;
 use serde::Serialize;
@@ -107,11 +105,7 @@ struct EvalView<'a> {
 
 impl EvalCommand {
     const fn notes(&self) -> Notes {
-        if self.json {
-            Notes::Stderr
-        } else {
-            Notes::Stdout
-        }
+        Notes::beside(self.json)
     }
 
     /// Evaluates the bundle, prints the result and writes the files.

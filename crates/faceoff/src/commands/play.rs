@@ -1,6 +1,7 @@
 //! `faceoff play`: one game or a series of games between two bundles. A *mirrored pair* is two games on one seed with swapped
 //! sides.
 
+mod attempt;
 mod bar;
 mod matchup;
 mod options;
@@ -10,7 +11,9 @@ mod series;
 mod series_results;
 mod table;
 
+use super::{notes::Notes, series_folders};
 use anyhow::{Context, bail};
+use attempt::{Attempt, Games};
 use bar::Bar;
 use clap::Args;
 use faceoff_dataset::game::{GAME_FILE, remove_game, side_file};
@@ -29,6 +32,7 @@ const DATASET: &str = "dataset.zip";
 /// Plays one game between two agents, each in its own sandbox, prints the result and writes to a folder:
 /// `results.json`, `game.zip` (for `faceoff verify`), `side-1.zip` and `side-2.zip` (the datasets of the
 /// sides) and `clips` (for replays). The exit status is 0 only if there is a result; a forfeit is a result.
+/// An agent that never answers ends the game without one.
 #[derive(Debug, Args)]
 pub struct PlayCommand {
     #[command(flatten)]
@@ -56,7 +60,7 @@ impl PlayCommand {
                 out.display()
             );
         }
-        if let Some(earlier) = series::find_earlier(out) {
+        if let Some(earlier) = series_folders::find_first(out) {
             bail!(
                 "{} contains the recordings of an earlier series: name another folder with --out, or remove it",
                 earlier.display()
@@ -74,8 +78,13 @@ impl PlayCommand {
 }
 
 fn play_game(options: &PlayOptions, matchup: &Matchup, results: &Results) -> anyhow::Result<()> {
-    let mut bar = Bar::steps(options.steps)?;
-    let played = matchup.play(options.seed, false, &options.out, &mut bar);
+    let bar = Bar::steps(options.steps)?;
+    let attempt = Attempt {
+        seed: options.seed,
+        swapped: false,
+        out: &options.out,
+    };
+    let played = Games::new(matchup, Notes::beside(options.json)).play(&attempt, &bar);
     bar.finish();
     let GameReport { archives, logs, .. } =
         played.map_err(with_advice).context("there is no result")?;

@@ -1,90 +1,88 @@
-//! `faceoff replay`: draws an episode as an HTML page or an SVG picture.
+//! `faceoff replay`: draws an episode of a dataset or a recorded game as an HTML page or an SVG picture.
 
+mod episode;
+mod game;
+mod input;
+mod output;
 mod page;
 mod plots;
 mod recording;
+mod table_parts;
 mod table_view;
 
-use super::output::print;
 use crate::competition::parse_task;
-use anyhow::{Context, bail};
+use anyhow::bail;
 use clap::Args;
 use faceoff_types::Task;
-use recording::EpisodeRecording;
-use serde_json::json;
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use input::Input;
+use output::{Format, Output};
+use std::path::PathBuf;
 
-/// Draws one episode of a dataset: the table from above, true and observed puck, speeds, constraints, computation
-/// times, and the reason of its end. An .html page is animated and needs no network.
+/// Draws a recorded game, or one episode of a dataset, as a page (.html), which is animated and needs no network, or as a
+/// picture (.svg). A game: the table from above, goals, fouls and faults as links into the replay, and the causes of penalty
+/// points. An episode: the table, true and observed puck, speeds, constraints, computation times, and the reason of its end.
 #[derive(Debug, Args)]
 pub struct ReplayCommand {
+    /// game.zip or a side's zip file of a game, the folder it was unpacked to, or the folder of `faceoff play --out`; or
     /// dataset.zip, the folder it was unpacked to, or the folder of `faceoff eval --out`
-    dataset: PathBuf,
-    /// The task
-    #[arg(long, value_parser = parse_task)]
-    task: Task,
-    /// The episode, from 0
-    #[arg(long, value_name = "N")]
-    episode: u32,
+    recording: PathBuf,
+    /// Of a dataset: the task
+    #[arg(long, value_parser = parse_task, requires = "episode")]
+    task: Option<Task>,
+    /// Of a dataset: the episode, from 0
+    #[arg(long, value_name = "N", requires = "task")]
+    episode: Option<u32>,
+    /// Of the folder of a series: the game, from 1 in the order of play
+    #[arg(long, value_name = "N", conflicts_with = "task")]
+    game: Option<u32>,
+    /// Of a game: the rally, from 0, that a picture shows and at which a page begins [default: a picture shows the last]
+    #[arg(long, value_name = "N", conflicts_with = "task")]
+    rally: Option<u32>,
     /// The file to write, a page (.html) or a picture (.svg); an existing file is replaced
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Print the reason of the episode's end as JSON
+    /// Print the reason of the episode's end, or the result and the events of the game, as JSON
     #[arg(long)]
     json: bool,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Format {
-    Html,
-    Svg,
-}
-
-impl Format {
-    fn of(path: &Path) -> anyhow::Result<Self> {
-        match path.extension().and_then(|extension| extension.to_str()) {
-            Some("html" | "htm") => Ok(Self::Html),
-            Some("svg") => Ok(Self::Svg),
-            _ => bail!(
-                "--out: expected a file that ends in .html or .svg, got {}",
-                path.display()
-            ),
-        }
-    }
-}
-
 impl ReplayCommand {
-    /// Reads the episode, draws it, and prints the reason of its end.
+    /// Draws the game or the episode, and prints its result or the reason of its end.
     ///
     /// # Errors
-    /// If the dataset cannot be read or lacks the episode, or the file cannot be written.
+    /// If the recording cannot be read or lacks the episode or rally, the options do not fit it, or the file cannot be written.
     pub fn run(self) -> anyhow::Result<()> {
-        let format = Format::of(&self.out)?;
-        let recording = EpisodeRecording::read(&self.dataset, self.task, self.episode)?;
-        let text = match format {
-            Format::Html => page::html(&recording)?,
-            Format::Svg => page::svg(&recording)?,
+        let output = Output {
+            format: Format::of(&self.out)?,
+            file: self.out,
+            json: self.json,
         };
-        fs::write(&self.out, text).with_context(|| format!("writing {}", self.out.display()))?;
-        let losses = recording.losses();
-        let summary = json!({
-            "episode": recording.headline(),
-            "why": recording.end_reason,
-            "losses": losses,
-            "file": self.out,
-        });
-        print(self.json, &summary, |_| {
-            let head = [recording.headline(), recording.end_reason.clone()];
-            let file = self.out.display().to_string();
-            let lines: Vec<String> = head
-                .into_iter()
-                .chain(losses.clone())
-                .chain([file])
-                .collect();
-            lines.join("\n")
-        })
+        let episode = self.task.zip(self.episode);
+        match Input::find(&self.recording, self.game, episode.is_some())? {
+            Input::Game(path) => {
+                if episode.is_some() {
+                    bail!(
+                        "{} is a game, which has rallies and no tasks: leave out --task and --episode (--rally N picks a rally)",
+                        path.display()
+                    );
+                }
+                game::draw(&path, self.rally, &output)
+            }
+            Input::Dataset(path) => {
+                if self.rally.is_some() {
+                    bail!(
+                        "{} is the dataset of an evaluation, which has no rallies: name an episode with --task and --episode",
+                        path.display()
+                    );
+                }
+                let Some((task, episode)) = episode else {
+                    bail!(
+                        "{} is the dataset of an evaluation: name an episode with --task and --episode (faceoff dataset list {0} lists them)",
+                        path.display()
+                    );
+                };
+                episode::draw(&path, task, episode, &output)
+            }
+        }
     }
 }

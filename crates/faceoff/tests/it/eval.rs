@@ -150,6 +150,29 @@ fn silent_agent_is_stopped_after_its_first_start() {
     );
 }
 
+/// The agent answers `hello` at once, and takes longer for its first reset than a silence that is explained.
+#[test]
+fn slow_first_reset_is_no_silence() {
+    let dir = tempfile::tempdir().unwrap();
+    let bundle = dir.path().join("bundle");
+    fs::create_dir(&bundle).unwrap();
+    for name in ["agent.toml", "agent.py", "protocol.py"] {
+        fs::copy(hold().join(name), bundle.join(name)).unwrap();
+    }
+    let source = fs::read_to_string(bundle.join("agent.py")).unwrap();
+    let slow = source.replace(
+        "        self.pose = None\n\n",
+        "        self.pose = None\n        __import__('time').sleep(6)\n\n",
+    );
+    assert_ne!(slow, source);
+    fs::write(bundle.join("agent.py"), slow).unwrap();
+    let args = ["--task", "defend", "--episodes", "1"];
+    let output = eval(&bundle, &dir.path().join("out"), &args);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let stdout = text(&output.stdout);
+    assert!(!stdout.contains("has not answered"), "{stdout}");
+}
+
 #[test]
 fn several_seeds_are_evaluated_and_pooled() {
     let dir = tempfile::tempdir().unwrap();

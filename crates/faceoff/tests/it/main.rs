@@ -11,4 +11,5 @@ mod new;
 mod play;
 mod program;
 mod replay;
+mod replay_game;
 mod sim;

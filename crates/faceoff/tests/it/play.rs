@@ -1,7 +1,11 @@
 //! `faceoff play`: games, forfeits, series and refusals.
 
 use crate::program::{LONG_TIME_LIMITS, SEED, command, file_names, hold, read_json, text};
-use std::{fs, path::Path, process::Output};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Output,
+};
 
 fn faceoff(args: &[&str], paths: &[&Path]) -> Output {
     command(args).args(paths).output().unwrap()
@@ -180,6 +184,56 @@ fn forfeit_is_a_result_and_json_equals_results_json() {
     }
     let verified = faceoff(&["verify"], &[&out]);
     assert!(verified.status.success(), "{}", text(&verified.stderr));
+}
+
+/// An agent that reads all of its input before it answers.
+fn silent_agent(dir: &Path) -> PathBuf {
+    let bundle = dir.join("silent");
+    fs::create_dir(&bundle).unwrap();
+    let manifest = fs::read_to_string(hold().join("agent.toml")).unwrap();
+    let renamed = manifest.replace("\"hold\"", "\"silent\"");
+    fs::write(bundle.join("agent.toml"), renamed).unwrap();
+    let source = "import sys\nprint('reading', file=sys.stderr)\nanswers = sys.stdin.read()\n";
+    fs::write(bundle.join("agent.py"), source).unwrap();
+    bundle
+}
+
+#[test]
+fn silent_side_is_named_and_ends_the_game_or_series() {
+    let dir = tempfile::tempdir().unwrap();
+    let silent = silent_agent(dir.path());
+    let config = dir.path().join("faceoff.toml");
+    fs::write(&config, "[time]\nstartup_s = 10.0\n").unwrap();
+    for (name, options) in [
+        ("game", &["--steps", "1000"][..]),
+        ("series", &["--steps", "1000", "--pairs", "3"]),
+    ] {
+        let out = dir.path().join(name);
+        let output = command(&["play"])
+            .args([&hold(), &silent])
+            .args(options)
+            .arg("--out")
+            .arg(&out)
+            .arg("--config")
+            .arg(&config)
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(1));
+        let (stdout, stderr) = (text(&output.stdout), text(&output.stderr));
+        for expected in [
+            "note: side 2 (silent) has not answered `hello` for 5 s",
+            "it reads all of its input before it answers",
+            "  reading",
+        ] {
+            assert!(stdout.contains(expected), "{expected:?} is not in {stdout}");
+        }
+        assert!(!stdout.contains("side 1 (hold)"), "{stdout}");
+        let expected =
+            "side 2 (silent) never answered, so the game was stopped after its first start: ";
+        assert!(stderr.contains(expected), "{stderr}");
+        assert!(!stderr.contains("platform fault"), "{stderr}");
+        assert!(!out.join("results.json").exists());
+    }
 }
 
 #[test]

@@ -188,4 +188,18 @@ fn invalid_replay_is_refused_with_a_reason() {
         message.contains("as the dataset of an evaluation"),
         "{message}"
     );
+    let unnamed = |options: &[&str]| {
+        let file = dir.join("unnamed.html");
+        let (dataset, file) = (out.to_str().unwrap(), file.to_str().unwrap());
+        let output = faceoff(&[&["replay", dataset, "--out", file], options].concat());
+        assert!(!output.status.success());
+        text(&output.stderr)
+    };
+    let message = unnamed(&[]);
+    assert!(
+        message.contains("name an episode with --task and --episode (faceoff dataset list"),
+        "{message}"
+    );
+    let message = unnamed(&["--rally", "0"]);
+    assert!(message.contains("has no rallies"), "{message}");
 }

@@ -1,11 +1,15 @@
 //! Threads that run the shards of an evaluation in parallel. A *shard* is a range of episodes of one task.
 
-use super::{logs::Logs, notes::Notes};
+use super::logs::Logs;
+use crate::commands::{
+    notes::Notes,
+    silence::{self, is_silent_start},
+};
 use anyhow::Context;
 use faceoff_runner::{
     AgentEnvironment, Observer, PlatformFault, ShardSpec, bundle::Bundle, run_shard,
 };
-use faceoff_types::{AgentFault, AgentFaultKind, EpisodeOutcome, Phase, Task};
+use faceoff_types::{AgentFault, AgentFaultKind, EpisodeOutcome, Task};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::{
     collections::VecDeque,
@@ -17,17 +21,7 @@ use std::{
         mpsc,
     },
     thread,
-    time::Duration,
 };
-
-/// Time without any answer after which the likely causes are printed.
-const EXPLAINED_SILENCE: Duration = Duration::from_secs(5);
-pub(super) const LIKELY_CAUSES: &str = "\
-Likely causes:
-  its output stays in a buffer: flush after every line (Python: print(line, flush=True))
-  it reads all of its input before it answers: read one line at a time
-  it prints to standard error or to a file: answers go to standard output
-  it is still loading: that may take as long as the start-up limit";
 
 /// A shard and the folder for its recording.
 #[derive(Debug)]
@@ -67,6 +61,8 @@ struct Pool {
     stop: AtomicBool,
     /// The agent has answered something.
     has_answered: AtomicBool,
+    /// Ends the wait for the first answer.
+    first_answer: mpsc::Sender<()>,
     /// The run was stopped because the agent had answered nothing.
     was_silent: AtomicBool,
     /// The kinds of the faults that were printed.
@@ -93,6 +89,7 @@ pub(super) fn run_shards(
         )
         .context("the progress bar's template")?,
     );
+    let (first_answer, answers) = mpsc::channel();
     let pool = Pool {
         jobs: Mutex::new(jobs.into()),
         faults: Mutex::default(),
@@ -102,14 +99,18 @@ pub(super) fn run_shards(
         max_faults,
         stop: AtomicBool::new(false),
         has_answered: AtomicBool::new(false),
+        first_answer,
         was_silent: AtomicBool::new(false),
         printed: Mutex::default(),
         bar,
         notes,
     };
     let results: Vec<Result<(), PlatformFault>> = thread::scope(|scope| {
-        let (running, has_ended) = mpsc::channel::<()>();
-        scope.spawn(|| pool.explain_silence(has_ended));
+        let pool = &pool;
+        let _end = EndOfRun(pool);
+        scope.spawn(move || {
+            silence::explain(&["the agent"], &answers, |note| pool.print(note));
+        });
         let workers: Vec<_> = envs
             .iter()
             .enumerate()
@@ -119,7 +120,7 @@ pub(super) fn run_shards(
                     .spawn_scoped(scope, || pool.run_jobs(bundle, env))
             })
             .collect();
-        let results = workers
+        workers
             .into_iter()
             .map(|worker| match worker {
                 Ok(worker) => worker
@@ -130,9 +131,7 @@ pub(super) fn run_shards(
                     source,
                 }),
             })
-            .collect();
-        drop(running);
-        results
+            .collect()
     });
     pool.bar.finish_and_clear();
     for result in results {
@@ -149,7 +148,9 @@ pub(super) fn run_shards(
     faults.sort_by_key(|fault| (order(fault.agent_task.name()), fault.episode));
     let logs = into_inner(pool.logs);
     if pool.was_silent.load(Ordering::Relaxed)
-        && let Some(position) = faults.iter().position(is_silent_start)
+        && let Some(position) = faults
+            .iter()
+            .position(|fault| is_silent_start(&fault.fault))
     {
         let fault = faults.swap_remove(position);
         return Ok(Verdict::NeverAnswered { fault, logs });
@@ -167,28 +168,11 @@ pub(super) fn run_shards(
     }
 }
 
-/// Whether the agent's process ran and did not answer `hello`.
-const fn is_silent_start(fault: &AgentFault) -> bool {
-    matches!(
-        fault.fault,
-        AgentFaultKind::TimedOut {
-            phase: Phase::StartUp,
-            ..
-        }
-    )
-}
-
 impl Pool {
-    /// Prints the likely causes if the agent has not answered after a while and the run has not ended.
-    fn explain_silence(&self, has_ended: mpsc::Receiver<()>) {
-        let is_running =
-            has_ended.recv_timeout(EXPLAINED_SILENCE) == Err(mpsc::RecvTimeoutError::Timeout);
-        if is_running && !self.has_answered.load(Ordering::Relaxed) {
-            self.print(format_args!(
-                "note: the agent has not answered `hello` for {} s. {LIKELY_CAUSES}",
-                EXPLAINED_SILENCE.as_secs()
-            ));
-        }
+    /// Ends the wait for the first answer: there is one, or the run is over.
+    fn end_wait_for_answer(&self) {
+        // Without a receiver, the wait is over already.
+        let _ended = self.first_answer.send(());
     }
 
     /// Prints a line without disturbing the progress bar.
@@ -223,6 +207,15 @@ impl Pool {
     }
 }
 
+/// Ends the wait for the first answer with the run, also when a worker panics.
+struct EndOfRun<'a>(&'a Pool);
+
+impl Drop for EndOfRun<'_> {
+    fn drop(&mut self) {
+        self.0.end_wait_for_answer();
+    }
+}
+
 /// Reports the progress of one thread to the pool.
 struct PoolObserver<'a>(&'a Pool);
 
@@ -234,7 +227,7 @@ impl Observer for PoolObserver<'_> {
             self.0.print_fault(fault);
             lock(&self.0.faults).push(fault.clone());
             // Every other start would be as silent.
-            if is_silent_start(fault) && !self.0.has_answered.load(Ordering::Relaxed) {
+            if is_silent_start(&fault.fault) && !self.0.has_answered.load(Ordering::Relaxed) {
                 self.0.was_silent.store(true, Ordering::Relaxed);
                 self.0.stop.store(true, Ordering::Relaxed);
             }
@@ -249,7 +242,10 @@ impl Observer for PoolObserver<'_> {
     }
 
     fn on_answer(&self) {
-        self.0.has_answered.store(true, Ordering::Relaxed);
+        let has_answered = &self.0.has_answered;
+        if !has_answered.load(Ordering::Relaxed) && !has_answered.swap(true, Ordering::Relaxed) {
+            self.0.end_wait_for_answer();
+        }
     }
 
     fn cancelled(&self) -> bool {

@@ -3,10 +3,12 @@
 use super::{
     files::{LOG, RESULTS, remove_earlier, write_json},
     logs::Logs,
-    notes::Notes,
-    pool::{Job, LIKELY_CAUSES, Verdict, run_shards},
+    pool::{Job, Verdict, run_shards},
 };
-use crate::competition::{competition, simulator};
+use crate::{
+    commands::{notes::Notes, silence},
+    competition::{competition, simulator},
+};
 use anyhow::{Context, bail};
 use faceoff_dataset::{ARCHIVE_FILE, AssembledDataset, assemble};
 use faceoff_runner::{AgentEnvironment, bundle::Bundle};
@@ -72,8 +74,8 @@ pub(super) fn run_profile(
             let path = write_log(out, &logs)?;
             print_first_output(setup.notes, &fault, &logs);
             bail!(
-                "the agent never answered, so the evaluation was stopped after its first start: {fault}. {LIKELY_CAUSES}\n\
-                 The agent's log is in {}",
+                "{}\nThe agent's log is in {}",
+                silence::stop_reason("the agent", "evaluation", &fault),
                 path.display()
             );
         }

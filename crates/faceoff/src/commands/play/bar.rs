@@ -1,8 +1,6 @@
 //! The progress bar of `faceoff play`.
 
 use anyhow::Context;
-use faceoff_airhockey::{GameStepRow, RallyRow};
-use faceoff_runner::GameObserver;
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// A progress bar, shown if standard error is a terminal.
@@ -36,6 +34,11 @@ impl Bar {
         self.bar.set_message(format!("{title} 0 : 0"));
     }
 
+    /// The bar, for lines that another thread prints above it.
+    pub(super) fn printer(&self) -> ProgressBar {
+        self.bar.clone()
+    }
+
     /// Runs `print_line`, whose output appears above the bar.
     pub(super) fn print_above(&self, print_line: impl FnOnce()) {
         self.bar.suspend(print_line);
@@ -44,20 +47,14 @@ impl Bar {
     pub(super) fn finish(&self) {
         self.bar.finish_and_clear();
     }
-}
 
-impl GameObserver for Bar {
-    fn on_step(&mut self, _: &GameStepRow<'_>) {
+    /// Counts a control step.
+    pub(super) fn add_step(&self) {
         self.bar.inc(1);
     }
 
-    fn on_rally_end(&mut self, row: &RallyRow<'_>) {
-        let [first, second] = row.score;
+    pub(super) fn show_score(&self, [first, second]: [u32; 2]) {
         self.bar
             .set_message(format!("{}{first} : {second}", self.title));
-    }
-
-    fn cancelled(&self) -> bool {
-        false
     }
 }

@@ -1,6 +1,7 @@
 //! A series of games between the same two bundles.
 
 use super::{
+    attempt::{Attempt, AttemptError, Games},
     bar::Bar,
     matchup::Matchup,
     options::PlayOptions,
@@ -9,21 +10,13 @@ use super::{
     series_results::{Series, SeriesGame, SeriesKind, SeriesResults},
     table,
 };
+use crate::commands::{notes::Notes, series_folders};
 use anyhow::Context;
 use faceoff_dataset::game::GAME_FILE;
 use faceoff_runner::{GameReport, PlatformFault};
-use std::path::{Path, PathBuf};
 
 /// Attempts per game; after that many failures on a busy host, the series ends.
 const MAX_ATTEMPTS: u32 = 5;
-
-/// A recording of an earlier series in a folder.
-pub(super) fn find_earlier(out: &Path) -> Option<PathBuf> {
-    ["pair-1", "game-1"]
-        .map(|name| out.join(name))
-        .into_iter()
-        .find(|path| path.exists())
-}
 
 /// Plays the series. Results are printed and written after each pair or game, so that an interrupted series has some,
 /// too.
@@ -48,6 +41,7 @@ pub(super) fn play(
         agents: matchup.agents(),
         spec: matchup.spec(),
     };
+    let mut players = Games::new(matchup, Notes::beside(options.json));
     let mut games = Vec::new();
     let mut json = String::new();
     if !options.json {
@@ -60,18 +54,22 @@ pub(super) fn play(
                 SeriesKind::MirroredPairs => (
                     options.seed.derive("pair", &number.to_le_bytes()),
                     *swapped,
-                    format!("pair-{number}/half-{half}"),
+                    series_folders::of_half(number, half),
                 ),
                 SeriesKind::Games => (
                     options.seed.derive("game", &number.to_le_bytes()),
                     number % 2 == 0,
-                    format!("game-{number}"),
+                    series_folders::of_game(number),
                 ),
             };
             bar.start_game(&folder, finished_steps, total_steps);
             let out = options.out.join(&folder);
-            let report =
-                play_with_retries(|| matchup.play(seed, swapped, &out, &mut bar), &folder)?;
+            let attempt = Attempt {
+                seed,
+                swapped,
+                out: &out,
+            };
+            let report = play_with_retries(|| players.play(&attempt, &bar), &folder)?;
             let score = &report.archives.score;
             Results::clear_in(&out)?.write(score)?;
             finished_steps += u64::from(options.steps);
@@ -103,13 +101,15 @@ pub(super) fn play(
 
 /// Plays a game, and plays it again if the host was too busy.
 fn play_with_retries(
-    mut play: impl FnMut() -> Result<GameReport, PlatformFault>,
+    mut play: impl FnMut() -> Result<GameReport, AttemptError>,
     folder: &str,
 ) -> anyhow::Result<GameReport> {
     let mut attempt = 1;
     loop {
         match play() {
-            Err(PlatformFault::HostBusy(_)) if attempt < MAX_ATTEMPTS => attempt += 1,
+            Err(AttemptError::Platform(PlatformFault::HostBusy(_))) if attempt < MAX_ATTEMPTS => {
+                attempt += 1
+            }
             result => {
                 return result.map_err(with_advice).with_context(|| {
                     format!("{folder} has no result; earlier results remain valid")

@@ -1,4 +1,4 @@
-//! The output of `faceoff replay`: an HTML page from `templates/replay`, or one SVG picture.
+//! An episode as output of `faceoff replay`: an HTML page from `templates/replay`, or one SVG picture.
 
 use super::{
     plots::{self, Plots},
@@ -9,11 +9,11 @@ use askama::Template;
 use faceoff_types::escape_unprintable;
 
 /// Width of the page's content and of the picture.
-const WIDTH_PX: u32 = 900;
+pub const WIDTH_PX: u32 = 900;
 /// Height of the two lines of text above the table in the picture.
-const TITLE_PX: u32 = 58;
+pub const TITLE_PX: u32 = 58;
 /// Height of the table as a share of its width in the picture, without its empty lower margin.
-const TABLE_ASPECT: f64 = 0.55;
+pub const TABLE_ASPECT: f64 = 0.55;
 
 #[derive(Template)]
 #[template(path = "replay/page.html")]
@@ -75,7 +75,7 @@ pub fn svg(recording: &EpisodeRecording) -> anyhow::Result<String> {
     ))
 }
 
-fn escape(text: &str) -> String {
+pub fn escape(text: &str) -> String {
     escape_unprintable(text)
         .replace('&', "&amp;")
         .replace('<', "&lt;")

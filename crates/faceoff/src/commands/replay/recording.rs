@@ -84,10 +84,7 @@ impl EpisodeRecording {
     /// Reads one episode of a dataset, and little else.
     pub fn read(path: &Path, task: Task, episode: u32) -> anyhow::Result<Self> {
         let dataset = Dataset::open_lazily(path, competition()).with_context(|| {
-            format!(
-                "opening {} as the dataset of an evaluation (the server has replays of games)",
-                path.display()
-            )
+            format!("opening {} as the dataset of an evaluation", path.display())
         })?;
         let steps = dataset.episode(task, episode, None)?;
         let record = dataset

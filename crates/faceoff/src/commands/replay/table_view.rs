@@ -1,6 +1,9 @@
 //! The picture of the table from above, with the paths of puck and mallets.
 
-use super::recording::{CONSTRAINTS, EpisodeRecording};
+use super::{
+    recording::{CONSTRAINTS, EpisodeRecording},
+    table_parts::{self, disc, path},
+};
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
     episode::task::{PLAYABLE_Y_M, TASK_RULES},
@@ -8,35 +11,11 @@ use faceoff_sim::{
     table::geometry::{PUCK, TABLE},
 };
 use faceoff_types::Task;
-use std::fmt::Write;
-
-/// Visible margin around the table, m.
-const MARGIN_M: f64 = 0.07;
 
 /// The table from above as SVG, with the opponent's goal on the right: paths, final positions, and marks of the first
 /// constraint violations. The script animates elements with an id.
 pub fn svg(recording: &EpisodeRecording, width_px: u32, attributes: &str) -> String {
-    let (half_length, half_width) = (TABLE.half_length_m(), TABLE.half_width_m());
-    let (left, top) = (-half_length - MARGIN_M, -half_width - MARGIN_M);
-    let (width, height) = (-2.0 * left, -2.0 * top);
-    let mut out = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" {attributes} width=\"{width_px}\" height=\"{:.0}\" \
-         viewBox=\"{left} {top} {width} {height}\" role=\"img\" aria-label=\"the table from above\">\n\
-         <g transform=\"scale(1 -1)\" fill=\"none\" stroke-width=\"0.004\">\n",
-        f64::from(width_px) * height / width
-    );
-    let half_goal = TABLE.goal_width_m / 2.0;
-    out += &format!(
-        "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"#fbfbf8\" stroke=\"#333\"/>\n\
-         <path d=\"M0 {}V{}\" stroke=\"#bbb\"/>\n",
-        -half_length, -half_width, TABLE.length_m, TABLE.width_m, -half_width, half_width
-    );
-    for x in [-half_length, half_length] {
-        out += &format!(
-            "<path d=\"M{x} {}V{half_goal}\" stroke=\"#c33\" stroke-width=\"0.012\"/>\n",
-            -half_goal
-        );
-    }
+    let mut out = table_parts::begin(width_px, attributes);
     out += &target_zone(recording.outcome.task);
     let puck: Vec<[f64; 2]> = recording.puck.iter().map(|[x, y, _]| [*x, *y]).collect();
     out += &path(
@@ -82,7 +61,7 @@ pub fn svg(recording: &EpisodeRecording, width_px: u32, attributes: &str) -> Str
     if let Some([x, y, _]) = recording.puck.last() {
         out += &disc("puck", *x, *y, puck_radius, "#e06a5c");
     }
-    out + "</g>\n</svg>\n"
+    out + table_parts::END
 }
 
 /// The zone in which the puck should end.
@@ -98,20 +77,5 @@ fn target_zone(task: Task) -> String {
         -half_width,
         to - from,
         2.0 * half_width
-    )
-}
-
-fn path(points: &[[f64; 2]], colour: &str, attributes: &str) -> String {
-    let mut out = String::from("<polyline points=\"");
-    for [x, y] in points {
-        // Writing to a string does not fail.
-        let _written = write!(out, "{x:.4},{y:.4} ");
-    }
-    out + &format!("\" stroke=\"{colour}\" {attributes}/>\n")
-}
-
-fn disc(id: &str, x: f64, y: f64, radius: f64, colour: &str) -> String {
-    format!(
-        "<circle id=\"{id}\" cx=\"{x:.4}\" cy=\"{y:.4}\" r=\"{radius}\" fill=\"{colour}\" stroke=\"#333\"/>\n"
     )
 }

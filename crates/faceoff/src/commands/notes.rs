@@ -1,4 +1,4 @@
-//! Notes of `faceoff eval`: lines that are not part of its result.
+//! Notes: lines that are not part of a command's result.
 
 use std::fmt;
 
@@ -12,6 +12,11 @@ pub(super) enum Notes {
 }
 
 impl Notes {
+    /// The stream that keeps the result of a command with or without `--json` readable.
+    pub(super) const fn beside(json: bool) -> Self {
+        if json { Self::Stderr } else { Self::Stdout }
+    }
+
     pub(super) fn print(self, line: fmt::Arguments<'_>) {
         match self {
             Self::Stdout => println!("{line}"),

@@ -1,0 +1,55 @@
+//! Draws a recorded game, and prints its result and events.
+
+mod clock;
+mod events;
+mod motion;
+mod page;
+mod penalties;
+mod recording;
+mod table;
+
+use super::output::{Format, Output};
+use crate::commands::output::print;
+use recording::RecordedGame;
+use serde_json::json;
+use std::path::Path;
+
+/// Draws the game at `path`. `rally` is the rally of a picture, or the one at which a page begins.
+pub fn draw(path: &Path, rally: Option<u32>, output: &Output) -> anyhow::Result<()> {
+    let game = RecordedGame::read(path)?;
+    let chosen = rally.map(|number| game.rally(number)).transpose()?;
+    output.write(match output.format {
+        Format::Html => page::html(&game, chosen)?,
+        Format::Svg => page::svg(&game, chosen)?,
+    })?;
+    let events = events::list(&game);
+    let score = &game.course.score;
+    let summary = json!({
+        "game": game.headline(),
+        "result": game.result(),
+        "agents": game.agents,
+        "seed": game.course.seed,
+        "steps": score.steps,
+        "rallies": score.rallies,
+        "sides": score.sides,
+        "events": events,
+        "penalties": penalties::list(&game),
+        "file": output.file,
+    });
+    print(output.json, &summary, |_| {
+        let mut lines = vec![game.headline(), game.result()];
+        lines.extend(
+            events
+                .iter()
+                .map(|event| format!("{:>8}  {}", clock::text(event.game_step), event.text)),
+        );
+        for (agent, side) in game.agents.iter().zip(&score.sides) {
+            lines.push(format!(
+                "{agent}: {} goals, {} fouls, {:.1} penalty points, {} faults",
+                side.goals, side.fouls, side.penalty_points, side.faults
+            ));
+        }
+        lines.push(output.file.display().to_string());
+        lines.join("\n")
+    })
+}

@@ -1,0 +1,104 @@
+//! The events of a game: ends of rallies with their reasons, agent faults, forfeits.
+
+use super::{clock, recording::RecordedGame};
+use faceoff_dataset::game::ListedRally;
+use faceoff_sim::game::referee::GAME_RULES;
+use faceoff_types::{FOULS_PER_POINT, Side, escape_unprintable};
+use serde::Serialize;
+
+/// An event of a game.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GameEvent {
+    pub time_s: f64,
+    /// Control steps of the game before it.
+    pub game_step: u32,
+    /// `goal`, `foul`, `stuck`, `left_table`, `diverged`, `game_over`, `fault` or `forfeit`.
+    pub event: String,
+    /// The side that scored, committed the foul, had the fault or forfeited: 1, 2 or absent.
+    pub by: Option<u32>,
+    /// The score after the end of a rally, with points for fouls.
+    pub score: Option<[u32; 2]>,
+    pub text: String,
+}
+
+impl GameEvent {
+    fn new(game_step: u32, event: &str, by: Option<u32>, text: String) -> Self {
+        Self {
+            time_s: clock::seconds(game_step),
+            game_step,
+            event: event.to_owned(),
+            by,
+            score: None,
+            text,
+        }
+    }
+}
+
+/// The events in the order of time.
+pub fn list(game: &RecordedGame) -> Vec<GameEvent> {
+    let mut events = faults(game);
+    let mut fouls = [0; 2];
+    for rally in &game.course.rallies {
+        events.push(rally_end(game, rally, &mut fouls));
+    }
+    for (side, score) in Side::BOTH.into_iter().zip(&game.course.score.sides) {
+        if let Some(cause) = &score.forfeit {
+            let text = format!("{} forfeited: {cause}", game.agents[side.index()]);
+            let step = game.course.score.steps;
+            events.push(GameEvent::new(step, "forfeit", Some(side.number()), text));
+        }
+    }
+    // Stable: a fault comes before the end of the rally that it may have caused.
+    events.sort_by_key(|event| event.game_step);
+    events
+}
+
+fn faults(game: &RecordedGame) -> Vec<GameEvent> {
+    let mut events = Vec::new();
+    for (side, course) in Side::BOTH.into_iter().zip(&game.course.sides) {
+        let faults = course.iter().flat_map(|course| &course.outcome.faults);
+        events.extend(faults.map(|fault| {
+            let cause = fault.fault.to_string();
+            let text = format!(
+                "fault of {}: {}",
+                game.agents[side.index()],
+                escape_unprintable(&cause)
+            );
+            GameEvent::new(fault.game_step, "fault", Some(side.number()), text)
+        }));
+    }
+    events
+}
+
+/// The end of a rally. `fouls` are the fouls so far.
+fn rally_end(game: &RecordedGame, rally: &ListedRally, fouls: &mut [u32; 2]) -> GameEvent {
+    let [first, second] = rally.score;
+    let text = match (rally.end.as_str(), rally.by) {
+        ("goal", Some(by)) => format!("goal by {}: {first} : {second}", game.agent(by)),
+        ("foul", Some(by)) => {
+            let count = &mut fouls[usize::from(by == 2)];
+            *count += 1;
+            let point = if count.is_multiple_of(FOULS_PER_POINT) {
+                format!("; a point for {}", game.agent(3 - by.clamp(1, 2)))
+            } else {
+                String::new()
+            };
+            format!(
+                "foul {count} by {}: the puck stayed on its side for more than {} s{point}; {first} : {second}",
+                game.agent(by),
+                GAME_RULES.foul_after_s
+            )
+        }
+        ("stuck", _) => {
+            "the puck stopped in the middle, where no robot reaches it; no foul".to_owned()
+        }
+        ("left_table", _) => "the puck left the table beside the goals".to_owned(),
+        ("diverged", _) => "the simulation diverged, see the fault".to_owned(),
+        ("game_over", _) => format!("end of the game: {first} : {second}"),
+        (end, _) => escape_unprintable(end).into_owned(),
+    };
+    GameEvent {
+        score: Some(rally.score),
+        ..GameEvent::new(rally.end_step(), &rally.end, rally.by, text)
+    }
+}
