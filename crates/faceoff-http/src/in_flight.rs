@@ -22,11 +22,16 @@ const MIN_CROWDED_REQUESTS: usize = 64;
 /// Longest time that a visitor's reading request may wait until the async runtime continues it. After a longer wait it is refused.
 const MAX_WAIT: Duration = Duration::from_millis(20);
 
+/// Readiness probes in flight. A balancer sends one at a time.
+const MAX_PROBES: usize = 16;
+
 /// Counts the requests in flight.
 #[derive(Debug, Clone)]
 pub(crate) struct InFlight {
     app: Arc<AppState>,
     places: Places,
+    /// Of readiness probes, which anyone can send: they take no places of teams.
+    probes: Places,
 }
 
 impl InFlight {
@@ -34,6 +39,7 @@ impl InFlight {
         Self {
             app: Arc::clone(app),
             places: Places::new(app.config.limits.requests),
+            probes: Places::new(MAX_PROBES),
         }
     }
 
@@ -59,11 +65,17 @@ pub(crate) async fn limit(
     if request.uri().path() == LIVE_PATH {
         return next.run(request).await;
     }
-    let precedence = match request.uri().path() {
-        // A balancer would take a server that is not ready from teams and organisers, too.
-        READY_PATH => Precedence::Team,
-        _ => in_flight.app.precedence(request.headers()),
-    };
+    // A balancer would take a server that is not ready from teams and organisers, too.
+    if request.uri().path() == READY_PATH {
+        let probe = in_flight.probes.take(Precedence::Organiser);
+        // A server that has no place even for organisers is not ready.
+        let is_full = in_flight.places.take(Precedence::Organiser).is_none();
+        if probe.is_none() || is_full {
+            return in_flight.refuse("in_flight");
+        }
+        return next.run(request).await;
+    }
+    let precedence = in_flight.app.precedence(request.headers());
     let Some(_place) = in_flight.places.take(precedence) else {
         return in_flight.refuse("in_flight");
     };

@@ -14,7 +14,7 @@ use faceoff_service::{
     auth::TeamCaller,
     extract::PathParam,
     problem::{Problem, ProblemKind},
-    services::partial_uploads::{self, IncomingPart},
+    services::partial_uploads::{self, IncomingPart, parse_hash},
 };
 
 /// Header with the number of bytes before a part.
@@ -102,18 +102,6 @@ pub(crate) async fn remove_upload(
 ) -> Result<StatusCode, Problem> {
     partial_uploads::remove(&app, caller.team.id, parse_hash(&hash)?).await?;
     Ok(StatusCode::NO_CONTENT)
-}
-
-/// The BLAKE3 hash that a path or query names.
-pub(super) fn parse_hash(text: &str) -> Result<blake3::Hash, Problem> {
-    blake3::Hash::from_hex(text).map_err(|_| {
-        Problem::new(
-            ProblemKind::InvalidRequest,
-            format!(
-                "expected the BLAKE3 hash of the whole bundle, 64 hexadecimal digits, got {text:?}"
-            ),
-        )
-    })
 }
 
 fn number(headers: &HeaderMap, name: &HeaderName, meaning: &str) -> Result<u64, Problem> {

@@ -1,6 +1,6 @@
 //! Uploading submissions. The uploaded file is the *bundle*: an archive with the agent, or a container image.
 
-use super::{document::Binary, partial_uploads::parse_hash};
+use super::document::Binary;
 use axum::{
     Json,
     body::Body,
@@ -14,7 +14,10 @@ use faceoff_service::{
     auth::TeamCaller,
     extract::QueryParams,
     problem::{Problem, ProblemKind},
-    services::uploads::{BundleSource, IncomingBundle, upload},
+    services::{
+        partial_uploads::parse_hash,
+        uploads::{BundleSource, IncomingBundle, upload},
+    },
     views::submission,
 };
 use faceoff_types::{IdempotencyKey, InvalidIdempotencyKey};

@@ -39,6 +39,9 @@ impl ProgramFile {
         match head {
             [b'#', b'!', line @ ..] => script(line),
             [0x7f, b'E', b'L', b'F', ..] => elf(head),
+            [b'M', b'Z', b'q', b'F', b'p', b'D', ..] => unusable(
+                "is an Actually Portable Executable (Cosmopolitan), which Linux only starts through a shell; convert it for Linux with `assimilate`",
+            ),
             [b'M', b'Z', ..] => unusable("is a program for Windows; build it for Linux"),
             [0xcf, 0xfa, 0xed, 0xfe, ..] | [0xca, 0xfe, 0xba, 0xbe, ..] => {
                 unusable("is a program for macOS (or a Java class); build it for Linux")
@@ -196,6 +199,7 @@ mod tests {
     #[test]
     fn programs_of_other_systems_are_recognised() {
         expect_unusable(b"MZ\x90\0", "Windows");
+        expect_unusable(b"MZqFpD='\n", "assimilate");
         expect_unusable(b"\xcf\xfa\xed\xfe\x07", "macOS");
         expect_unusable(b"#!/usr/bin/env python3\r\nimport os\r\n", "line ends");
         expect_unusable(b"\xef\xbb\xbf#!/bin/sh\n", "byte order mark");

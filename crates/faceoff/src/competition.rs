@@ -3,6 +3,7 @@
 use faceoff_airhockey::AirHockey;
 use faceoff_api::requests::read_perturbations;
 use faceoff_episode::Simulator;
+use faceoff_sim::export::{Model, mjcf, urdf};
 use faceoff_types::{
     Competition, InvalidWeights, Magnitudes, Profile, Task, TaskWeights, UnknownProfile,
     UnknownTask,
@@ -19,6 +20,22 @@ pub fn competition() -> &'static Arc<Competition> {
 /// Its simulator.
 pub fn simulator() -> Arc<dyn Simulator> {
     SIMULATOR.clone()
+}
+
+/// Files that describe the competition to other programs: name, content, and the text.
+pub fn description_files() -> [(&'static str, &'static str, String); 2] {
+    [
+        (
+            "robot.urdf",
+            "The robot arm with its mallet, for simulators that read URDF",
+            urdf(Model::Plant),
+        ),
+        (
+            "robot.mjcf.xml",
+            "Robot arm, table and puck, for MuJoCo",
+            mjcf(Model::Plant),
+        ),
+    ]
 }
 
 /// Parses a task on the command line.

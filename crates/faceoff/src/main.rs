@@ -13,6 +13,7 @@ mod exit;
 mod log;
 mod machine;
 mod packing;
+mod user_scope;
 
 use clap::{CommandFactory, Parser, Subcommand};
 use exit::Exit;

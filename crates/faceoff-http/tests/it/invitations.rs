@@ -169,7 +169,7 @@ async fn registration_link_is_valid_once_approved() {
     let beta = register(&site, "Beta").await.json(201);
     register(&site, "beta")
         .await
-        .problem(409, "team-name-taken", &["beta"]);
+        .problem(409, "team-name-taken", &["Beta"]);
 
     let join_by = async |registration: &Value, name: &str| {
         let request = json!({ "code": registration["code"], "name": name });

@@ -28,7 +28,7 @@ mod divisions;
 mod docs;
 mod download_links;
 mod downloads;
-mod downloads;
+mod downloads_page;
 mod evaluations;
 mod event_stream;
 mod events;

@@ -19,6 +19,7 @@ pub mod submissions;
 pub mod teams;
 pub mod tokens;
 pub mod tournament_rounds;
+mod upload_limits;
 pub mod uploads;
 pub mod users;
 pub mod workers;

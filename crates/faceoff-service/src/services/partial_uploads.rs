@@ -4,7 +4,7 @@
 
 use super::{
     bundle_stream::{self, RateGuardedBody, ReceivedBundle},
-    uploads::{UploadLimits, acquire_slot, check_may_upload, size_limit},
+    upload_limits::{UploadLimits, acquire_slot, check_may_upload, size_limit},
 };
 use crate::{
     app::{App, AppState},
@@ -221,6 +221,21 @@ pub async fn remove(app: &App, team: TeamId, bundle: blake3::Hash) -> Result<(),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Err(nothing_received(bundle)),
         Err(error) => Err(Problem::internal(error)),
     }
+}
+
+/// The BLAKE3 hash that a request names.
+///
+/// # Errors
+/// `InvalidRequest`.
+pub fn parse_hash(text: &str) -> Result<blake3::Hash, Problem> {
+    blake3::Hash::from_hex(text).map_err(|_| {
+        Problem::new(
+            ProblemKind::InvalidRequest,
+            format!(
+                "expected the BLAKE3 hash of the whole bundle, 64 hexadecimal digits, got {text:?}"
+            ),
+        )
+    })
 }
 
 fn nothing_received(bundle: blake3::Hash) -> Problem {

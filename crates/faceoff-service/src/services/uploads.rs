@@ -3,21 +3,17 @@
 use super::{
     bundle_stream::{self, ReceivedBundle, SizeLimit},
     partial_uploads,
+    upload_limits::{UploadLimits, acquire_slot, check_may_upload, size_limit},
 };
 use crate::{
-    app::App,
-    auth::TeamCaller,
-    boxed, free_space,
-    partial_uploads::PartialUploadLock,
-    problem::{Problem, ProblemKind},
-    upload_slots::UploadSlot,
-    views::stage,
+    app::App, auth::TeamCaller, boxed, free_space, partial_uploads::PartialUploadLock,
+    problem::Problem, upload_slots::UploadSlot,
 };
 use axum::body::Body;
-use faceoff_store::{Actor, StoreError, Submission, Team, UploadQuota, UploadUsage};
+use faceoff_store::{Actor, StoreError, Submission, Team};
 use faceoff_types::{ArchiveFormat, BundleRef, IdempotencyKey, TeamId};
-use jiff::Timestamp;
 use std::sync::Arc;
+use unicode_normalization::{UnicodeNormalization, char::is_combining_mark};
 use uuid::Uuid;
 
 /// A bundle that is being uploaded.
@@ -122,100 +118,6 @@ async fn receive(
     bundle_stream::receive(body, bytes, dir, &limit, rate).await
 }
 
-/// A slot of the team for the duration of an upload.
-///
-/// # Errors
-/// `TooManyUploads`.
-pub(super) fn acquire_slot(app: &App, team: TeamId) -> Result<UploadSlot, Problem> {
-    app.upload_slots.acquire(team).ok_or_else(|| {
-        let limit = app.config.limits.team_uploads;
-        Problem::new(
-            ProblemKind::TooManyUploads,
-            format!("{limit} uploads of your team are running already; wait until one has ended"),
-        )
-        .with("limit", limit)
-    })
-}
-
-/// Whether the team may upload a bundle now. The store checks this, too, but only after the transfer.
-///
-/// # Errors
-/// `SeasonClosed` or `TooManyPending`.
-pub(super) async fn check_may_upload(
-    app: &App,
-    team: TeamId,
-    limits: &UploadLimits,
-) -> Result<(), Problem> {
-    if let Some(closed_at) = app.store.season().await?.closed_at {
-        return Err(StoreError::SeasonClosed { closed_at }.into());
-    }
-    let pending = app
-        .store
-        .submissions_of(team)
-        .await?
-        .iter()
-        .filter(|submission| !submission.state.is_checked())
-        .count();
-    if pending >= limits.max_pending {
-        return Err(Problem::new(
-            ProblemKind::TooManyPending,
-            format!(
-                "{pending} submissions of your team are waiting for their validation run already; wait until one has \
-                 its verdict (GET /api/v1/submissions)"
-            ),
-        ));
-    }
-    Ok(())
-}
-
-/// Upload limits of a team, from the current stage or the server's configuration.
-#[derive(Clone, Copy)]
-pub(super) struct UploadLimits {
-    /// Largest number of submissions that wait for their validation run.
-    max_pending: usize,
-    pub(super) quota: UploadQuota,
-}
-
-impl UploadLimits {
-    pub(super) async fn current(app: &App) -> Result<Self, Problem> {
-        let limits = &app.config.limits;
-        let stage_limits = stage::current(app).await?.settings.uploads;
-        let quota = limits.upload_quota;
-        Ok(Self {
-            max_pending: stage_limits
-                .waiting
-                .map_or(limits.pending_submissions, |waiting| waiting as usize),
-            quota: UploadQuota {
-                day_bytes: stage_limits.day_bytes.unwrap_or(quota.day_bytes),
-                stored_bytes: stage_limits.stored_bytes.unwrap_or(quota.stored_bytes),
-            },
-        })
-    }
-}
-
-/// The size limit of a bundle: the limit for all teams, or the rest of the team's quota if that is less.
-pub(super) fn size_limit(
-    app: &App,
-    quota: UploadQuota,
-    usage: UploadUsage,
-    now: Timestamp,
-) -> SizeLimit {
-    let max_bundle_bytes = app.config.max_bundle_bytes;
-    let left_bytes = quota.remaining(usage);
-    SizeLimit {
-        max_bytes: left_bytes.min(max_bundle_bytes),
-        make_problem: Box::new(move |announced_bytes| {
-            let bytes = announced_bytes.unwrap_or(left_bytes.saturating_add(1));
-            match quota.check(usage, bytes) {
-                Err(error) if left_bytes < max_bundle_bytes => {
-                    Problem::with_quota_reset(error, now)
-                }
-                _ => bundle_stream::too_large(max_bundle_bytes, announced_bytes),
-            }
-        }),
-    }
-}
-
 /// Stores a received bundle and creates its submission.
 async fn store(
     app: App,
@@ -272,9 +174,10 @@ fn file_name(claimed: &str, format: ArchiveFormat) -> String {
     /// Longest name that is kept.
     const MAX_CHARS: usize = 80;
     let last_component = claimed.rsplit(['/', '\\']).next().unwrap_or_default();
+    // macOS writes “é” as a letter and an accent.
     let safe: String = last_component
-        .chars()
-        .filter(|c| c.is_alphanumeric() || "._-".contains(*c))
+        .nfc()
+        .filter(|c| c.is_alphanumeric() || is_combining_mark(*c) || "._-".contains(*c))
         .take(MAX_CHARS)
         .collect();
     let stem = safe.trim_start_matches('.');
@@ -302,6 +205,8 @@ mod tests {
         assert_eq!(tar_gz_name("striker.tgz"), "striker.tgz");
         assert_eq!(tar_gz_name("../../etc/passwd"), "passwd.tar.gz");
         assert_eq!(tar_gz_name("C:\\agents\\a b.zip"), "ab.zip.tar.gz");
+        assert_eq!(tar_gz_name("Zoe\u{308}.tar.gz"), "Zoë.tar.gz");
+        assert_eq!(tar_gz_name("हिन्दी.tar.gz"), "हिन्दी.tar.gz");
         assert_eq!(tar_gz_name(""), "agent.tar.gz");
         assert_eq!(tar_gz_name(".."), "agent.tar.gz");
         assert_eq!(file_name("x", ArchiveFormat::Zip), "x.zip");

@@ -4,6 +4,7 @@ use crate::{
     competition::competition,
     config::{Config, RuntimeConfig},
     packing::Selection,
+    user_scope,
 };
 use anyhow::{Context, bail};
 use faceoff_runner::{
@@ -53,7 +54,7 @@ pub(super) fn open(
 }
 
 /// Gives up the layers of the sandbox that this user cannot get on this host: developers run their own agents, which they could also
-/// run without a sandbox. Returns the note that says which layers are missing, if any are.
+/// run without a sandbox. Before, the command starts anew in a scope of systemd, if that gives the user control groups. Returns the note that says which layers are missing, if any are.
 ///
 /// # Errors
 /// If a bundle is an archive, which may be another team's, and a layer is missing that keeps agents from the user's files and the
@@ -72,6 +73,10 @@ pub(super) fn give_up_unavailable_layers(
         .into_iter()
         .map(|feature| feature.layer)
         .collect();
+    let cgroups = [Layer::CgroupMemory, Layer::CgroupPids, Layer::CgroupCpu];
+    if missing.iter().any(|layer| cgroups.contains(layer)) {
+        user_scope::enter();
+    }
     let protection = [Layer::Namespaces, Layer::Seccomp];
     let missing_protection = missing.iter().find(|layer| protection.contains(layer));
     let archive = bundles.iter().find(|bundle| !bundle.is_dir());

@@ -107,7 +107,11 @@ async fn print_validation(client: &Client, submission: &SubmissionView) -> anyho
             let agent = submission.agent_name.as_deref().unwrap_or("the agent");
             print_log(log.as_deref());
             println!("valid: {agent} starts, responds and meets the time limits");
-            println!("{}", next_cutoff_text(&client.me().await?, submission.id));
+            // The submission is valid, whatever becomes of this question.
+            match retry_temporary(PATIENCE, async || client.me().await).await {
+                Ok(me) => println!("{}", next_cutoff_text(&me, submission.id)),
+                Err(error) => eprintln!("the next cutoff is not known: {error:#}"),
+            }
         }
         SubmissionStatus::Invalid { log, .. } => print_log(log.as_deref()),
         SubmissionStatus::ValidationError { .. } | SubmissionStatus::Validating => {}

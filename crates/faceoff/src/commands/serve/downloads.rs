@@ -1,9 +1,8 @@
-//! The files of the page `/downloads`: this program, examples of agents, the robot's description, and those of a folder.
+//! The files of the page `/downloads`: this program, examples of agents, descriptions of the competition, and those of a folder.
 
-use crate::commands::new::example_archives;
+use crate::{commands::new::example_archives, competition::description_files};
 use anyhow::Context;
 use faceoff_http::{Download, DownloadContent, Downloads};
-use faceoff_sim::export::{Model, mjcf, urdf};
 use std::path::{Path, PathBuf};
 
 /// This program, even if another version has been installed under its name since.
@@ -27,18 +26,7 @@ pub(super) fn downloads(folder: Option<&Path>) -> anyhow::Result<Downloads> {
     for (name, about, archive) in example_archives()? {
         downloads.push(in_memory(name, about, archive));
     }
-    for (name, about, text) in [
-        (
-            "robot.urdf",
-            "The robot arm with its mallet, for simulators that read URDF",
-            urdf(Model::Plant),
-        ),
-        (
-            "robot.mjcf.xml",
-            "Robot arm, table and puck, for MuJoCo",
-            mjcf(Model::Plant),
-        ),
-    ] {
+    for (name, about, text) in description_files() {
         downloads.push(in_memory(name, about, text.into_bytes()));
     }
     if let Some(folder) = folder {
