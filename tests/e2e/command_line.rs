@@ -298,7 +298,8 @@ fn submitted_folder_is_evaluated_and_dataset_downloaded() {
     assert_eq!(ada(&["log", "latest", "--json"]).json()["of"], "evaluation");
     ada(&["evaluation", "Beta", date])
         .expect_refusal(FAILED, &["Beta", "these teams have one: Alpha"]);
-    ada(&["evaluation", "Alpha", "2001-01-01"]).expect_refusal(REFUSED, &["404"]);
+    ada(&["evaluation", "Alpha", "2001-01-01"])
+        .expect_refusal(FAILED, &["no results of 2001-01-01 are public"]);
     ada(&["evaluation", "soon"]).expect_refusal(FAILED, &["`latest`, or a team and a day"]);
     // A visitor finds it on the board, and sees it when it is published.
     let visitor = scratch.path().join("visitor");

@@ -19,6 +19,7 @@ mod cutoff;
 mod dashboards;
 mod demo;
 mod full_disk;
+mod game_replay;
 mod installation;
 mod invalid_actions;
 mod kills;

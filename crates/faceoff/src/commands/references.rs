@@ -1,12 +1,13 @@
 //! How commands name submissions and evaluations: by an id, by a part of one, by `latest`, or by a team and a day.
 
-use crate::client::Client;
+use crate::client::{Client, is_refused_with};
 use anyhow::{Context, bail};
 use clap::Args;
 use faceoff_api::requests::{BoardBy, BoardQuery};
 use faceoff_types::{EvaluationId, SubmissionId};
 use jiff::civil::Date;
-use std::{fmt::Display, str::FromStr};
+use reqwest::StatusCode;
+use std::{collections::BTreeSet, fmt::Display, iter, str::FromStr};
 
 /// Number of the team's newest evaluations among which a part of an id is looked up.
 const NEWEST_EVALUATIONS: usize = 200;
@@ -136,34 +137,65 @@ pub(super) async fn find_evaluation(client: &Client, text: &str) -> anyhow::Resu
     }
 }
 
-/// The evaluation of a team on a day: one that the caller may see before its release, or one of the day's board.
+/// The evaluation of a team on a day: one that the caller may see before its release, or one of the boards of that day, first of
+/// the current stage.
 async fn find_by_day(client: &Client, team: &str, day: Date) -> anyhow::Result<EvaluationId> {
-    // Visitors have no evaluations of their own.
-    let own = client.evaluations(Some(day)).await.unwrap_or_default();
+    let own = unless(client.evaluations(Some(day)).await, is_hidden)?.unwrap_or_default();
     let has_name = |name: &str| name.to_lowercase() == team.to_lowercase();
     if let Some(evaluation) = own.iter().find(|found| has_name(found.team_name.as_str())) {
         return Ok(evaluation.id);
     }
-    // A team's newest result up to the day.
-    let query = BoardQuery {
-        day: Some(day),
-        by: Some(BoardBy::Latest),
-        ..BoardQuery::default()
-    };
-    let board = client.board(None, &query).await?;
-    let rows: Vec<_> = board.rows.iter().filter(|row| row.day == day).collect();
-    if let Some(row) = rows.iter().find(|row| has_name(row.team.as_str())) {
-        return Ok(row.evaluation);
+    let mut names = BTreeSet::new();
+    let stages = unless(client.stages().await, is_hidden)?.unwrap_or_default();
+    let other_stages = stages.iter().map(|stage| Some(stage.id));
+    for stage in iter::once(None).chain(other_stages) {
+        // A team's newest result up to the day.
+        let query = BoardQuery {
+            stage,
+            day: Some(day),
+            by: Some(BoardBy::Latest),
+            ..BoardQuery::default()
+        };
+        let has_no_board = |error: &anyhow::Error| {
+            is_hidden(error) || is_refused_with(error, StatusCode::NOT_FOUND)
+        };
+        let board = unless(client.board(None, &query).await, has_no_board)?;
+        for row in board.into_iter().flat_map(|board| board.rows) {
+            if row.day == day && has_name(row.team.as_str()) {
+                return Ok(row.evaluation);
+            }
+            if row.day == day {
+                names.insert(row.team.to_string());
+            }
+        }
     }
-    let mut names: Vec<&str> = rows.iter().map(|row| row.team.as_str()).collect();
-    names.sort_unstable();
     if names.is_empty() {
         bail!("no results of {day} are public");
     }
+    let names: Vec<String> = names.into_iter().collect();
     bail!(
         "{team:?} has no public result of {day}; these teams have one: {}",
         names.join(", ")
     )
+}
+
+/// Whether the caller may not see it.
+fn is_hidden(error: &anyhow::Error) -> bool {
+    [StatusCode::UNAUTHORIZED, StatusCode::FORBIDDEN]
+        .into_iter()
+        .any(|status| is_refused_with(error, status))
+}
+
+/// The response; `None` after an expected refusal.
+fn unless<T>(
+    response: anyhow::Result<T>,
+    is_expected: impl Fn(&anyhow::Error) -> bool,
+) -> anyhow::Result<Option<T>> {
+    match response {
+        Ok(found) => Ok(Some(found)),
+        Err(error) if is_expected(&error) => Ok(None),
+        Err(error) => Err(error),
+    }
 }
 
 #[cfg(test)]
@@ -201,5 +233,23 @@ mod tests {
                 .unwrap_err()
                 .starts_with("your team has no evaluation")
         );
+    }
+
+    #[test]
+    fn only_hidden_evaluations_are_no_error() {
+        let refused = |status: u16| -> anyhow::Result<()> {
+            Err(crate::client::ApiError {
+                status: StatusCode::from_u16(status).unwrap(),
+                title: String::new(),
+                detail: String::new(),
+            }
+            .into())
+        };
+        for status in [401, 403] {
+            assert_eq!(unless(refused(status), is_hidden).unwrap(), None);
+        }
+        for status in [404, 429, 500] {
+            assert!(unless(refused(status), is_hidden).is_err(), "{status}");
+        }
     }
 }

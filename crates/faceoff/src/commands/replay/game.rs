@@ -44,9 +44,15 @@ pub fn draw(path: &Path, rally: Option<u32>, output: &Output) -> anyhow::Result<
                 .map(|event| format!("{:>8}  {}", clock::text(event.game_step), event.text)),
         );
         for (agent, side) in game.agents.iter().zip(&score.sides) {
+            let count = |count: u32, unit: &str| {
+                format!("{count} {unit}{}", if count == 1 { "" } else { "s" })
+            };
             lines.push(format!(
-                "{agent}: {} goals, {} fouls, {:.1} penalty points, {} faults",
-                side.goals, side.fouls, side.penalty_points, side.faults
+                "{agent}: {}, {}, {:.1} penalty points, {}",
+                count(side.goals, "goal"),
+                count(side.fouls, "foul"),
+                side.penalty_points,
+                count(side.faults, "fault")
             ));
         }
         lines.push(output.file.display().to_string());

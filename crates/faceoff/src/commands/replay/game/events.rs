@@ -3,7 +3,7 @@
 use super::{clock, recording::RecordedGame};
 use faceoff_dataset::game::ListedRally;
 use faceoff_sim::game::referee::GAME_RULES;
-use faceoff_types::{FOULS_PER_POINT, Side, escape_unprintable};
+use faceoff_types::{AgentFault, FOULS_PER_POINT, Side, escape_unprintable};
 use serde::Serialize;
 
 /// An event of a game.
@@ -36,11 +36,12 @@ impl GameEvent {
 
 /// The events in the order of time.
 pub fn list(game: &RecordedGame) -> Vec<GameEvent> {
-    let mut events = faults(game);
     let mut fouls = [0; 2];
-    for rally in &game.course.rallies {
-        events.push(rally_end(game, rally, &mut fouls));
-    }
+    let rallies = game.course.rallies.iter();
+    let mut events: Vec<GameEvent> = rallies
+        .map(|rally| rally_end(game, rally, &mut fouls))
+        .collect();
+    events.extend(faults(game));
     for (side, score) in Side::BOTH.into_iter().zip(&game.course.score.sides) {
         if let Some(cause) = &score.forfeit {
             let text = format!("{} forfeited: {cause}", game.agents[side.index()]);
@@ -48,8 +49,13 @@ pub fn list(game: &RecordedGame) -> Vec<GameEvent> {
             events.push(GameEvent::new(step, "forfeit", Some(side.number()), text));
         }
     }
-    // Stable: a fault comes before the end of the rally that it may have caused.
-    events.sort_by_key(|event| event.game_step);
+    // A rally ends before the agent is started or reset for the next one.
+    events.sort_by_key(|event| {
+        (
+            event.game_step,
+            event.event == "game_over" || event.event == "forfeit",
+        )
+    });
     events
 }
 
@@ -58,9 +64,22 @@ fn faults(game: &RecordedGame) -> Vec<GameEvent> {
     for (side, course) in Side::BOTH.into_iter().zip(&game.course.sides) {
         let faults = course.iter().flat_map(|course| &course.outcome.faults);
         events.extend(faults.map(|fault| {
-            let cause = fault.fault.to_string();
+            let AgentFault {
+                fault: kind,
+                episode,
+                step,
+                line,
+                ..
+            } = &fault.fault;
+            let place = match (episode, step) {
+                (Some(rally), Some(step)) => format!("at step {step} of rally {rally}"),
+                (Some(rally), None) => format!("at its reset for rally {rally}"),
+                (None, _) => "at its start".to_owned(),
+            };
+            let line = line.as_ref().map(|line| format!(" (line: {line})"));
+            let cause = format!("{kind}{}", line.unwrap_or_default());
             let text = format!(
-                "fault of {}: {}",
+                "fault of {} {place}: {}",
                 game.agents[side.index()],
                 escape_unprintable(&cause)
             );

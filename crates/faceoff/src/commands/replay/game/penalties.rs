@@ -36,7 +36,7 @@ pub fn list(game: &RecordedGame) -> Vec<Penalty> {
                 game_step,
                 side: side.number(),
                 points,
-                text: format!("{points} points for {agent}: {cause}"),
+                text: format!("{} for {agent}: {cause}", points_text(points)),
             }));
         }
     }
@@ -75,6 +75,11 @@ fn violations(course: &SideCourse, start: u32) -> impl Iterator<Item = (u32, f64
             );
             Some((first, points, cause))
         })
+}
+
+fn points_text(points: f64) -> String {
+    let is_one = (points - 1.0).abs() < f64::EPSILON;
+    format!("{points} point{}", if is_one { "" } else { "s" })
 }
 
 fn window_text(start: u32) -> String {
