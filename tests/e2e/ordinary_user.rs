@@ -42,12 +42,16 @@ impl Home {
 
     /// Runs the program as the ordinary user where bubblewrap, which makes namespaces, is not installed.
     fn run_without_bubblewrap(&self, args: &[&str]) -> Output {
-        let hidden = "for file in /usr/bin/bwrap /usr/local/bin/bwrap /bin/bwrap; do \
-             if [ -f $file ]; then mount --bind /dev/null $file; fi; done && exec \"$@\"";
-        let mut command = Command::new("unshare");
-        command.args(["--mount", "--propagation", "private"]);
-        command.args(["sh", "-ec", hidden, "sh", "setpriv"]);
-        self.run_by(command, args)
+        self.run_after(
+            "for file in /usr/bin/bwrap /usr/local/bin/bwrap /bin/bwrap; do \
+             if [ -f $file ]; then mount --bind /dev/null $file; fi; done",
+            args,
+        )
+    }
+
+    /// Runs the program as the ordinary user after root has changed mounts by these commands of the shell.
+    fn run_after(&self, mounts: &str, args: &[&str]) -> Output {
+        self.run_by(after_mounts(mounts, "setpriv"), args)
     }
 
     /// `command` ends with the program `setpriv`, without its arguments.
@@ -62,6 +66,14 @@ impl Home {
             .output()
             .expect("setpriv starts")
     }
+}
+
+/// A command that begins with `program`, in a mount namespace in which root has run these commands of the shell.
+fn after_mounts(mounts: &str, program: &str) -> Command {
+    let mut command = Command::new("unshare");
+    command.args(["--mount", "--propagation", "private", "sh", "-ec"]);
+    command.args([&format!("{mounts}\nexec \"$@\""), "sh", program]);
+    command
 }
 
 /// Asserts success, and returns the output.
@@ -144,4 +156,91 @@ fn other_teams_archives_need_namespaces() {
     let args = ["eval", bundle, "--task", "hit", "--episodes", "1"];
     let output = expect_success(&home.run_without_bubblewrap(&args));
     assert!(output.contains("namespaces"), "{output}");
+}
+
+#[test]
+fn both_cgroup_versions_and_none_suffice_for_own_agents() {
+    let home = Home::create();
+    let bundle = home.folder.path().join("hold");
+    copy_folder(&repository().join("agents/hold"), &bundle);
+    let bundle = bundle.to_str().expect("the path is text");
+    let args = ["eval", bundle, "--task", "hit", "--episodes", "1"];
+    for mounts in [
+        "mount --types tmpfs none /sys/fs/cgroup; mkdir /sys/fs/cgroup/memory; \
+         mount --types cgroup --options memory none /sys/fs/cgroup/memory || true",
+        "mount --types tmpfs none /sys/fs/cgroup; mount --types cgroup2 none /sys/fs/cgroup",
+        "mount --types tmpfs --options ro none /sys/fs/cgroup",
+    ] {
+        let output = expect_success(&home.run_after(mounts, &args));
+        let note = output.lines().next().unwrap_or_default();
+        assert!(note.contains("cgroup-memory"), "{mounts}: {output}");
+        assert!(!note.contains("namespaces"), "{mounts}: {output}");
+    }
+}
+
+#[test]
+fn container_without_privileges_evaluates_own_agents() {
+    const DOCKER: &str = "-all,+chown,+dac_override,+fowner,+fsetid,+kill,+setgid,+setuid,+setpcap,\
+        +net_bind_service,+net_raw,+sys_chroot,+mknod,+audit_write,+setfcap";
+    let home = Home::create();
+    let args = ["--task", "hit", "--episodes", "1"];
+    let bundle = repository().join("agents/hold");
+    // As root with the capabilities that Docker gives.
+    let mut command = after_mounts(
+        "mount --types tmpfs --options ro none /sys/fs/cgroup",
+        "setpriv",
+    );
+    command.args([&format!("--bounding-set={DOCKER}"), "--inh-caps=-all"]);
+    let output = command
+        .arg(&home.program)
+        .arg("eval")
+        .arg(&bundle)
+        .args(args);
+    let output = output.current_dir(home.folder.path()).output();
+    let output = expect_success(&output.expect("the program starts"));
+    assert!(output.contains("namespaces"), "{output}");
+
+    // In a user namespace in which no further one may be made, not as its root.
+    let forbidden = "exec unshare --user --map-root-user sh -ec \
+        'echo 0 > /proc/sys/user/max_user_namespaces; exec unshare --user --map-user=1 true'";
+    let nested = Command::new("sh").args(["-c", forbidden]).status();
+    assert!(
+        !nested.expect("unshare starts").success(),
+        "the test's host can forbid them"
+    );
+    let forbid = "echo 0 > /proc/sys/user/max_user_namespaces; exec \"$@\"";
+    let mut command = Command::new("unshare");
+    command.args(["--user", "--map-root-user", "sh", "-ec", forbid, "sh"]);
+    let output = command.arg(&home.program).arg("doctor").output();
+    let output = output.expect("the program starts");
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(
+        text.contains("run it as an ordinary user, or map more ids"),
+        "{text}"
+    );
+}
+
+#[test]
+fn doctor_names_the_cure_of_an_old_bubblewrap() {
+    let home = Home::create();
+    let old = home.folder.path().join("bwrap");
+    let script =
+        "#!/bin/sh\ncase $1 in --version) echo bubblewrap 0.3.0;; *) echo --as-pid-1;; esac\n";
+    fs::write(&old, script).expect("a scratch file can be written");
+    fs::set_permissions(&old, Permissions::from_mode(0o755)).expect("it is ours");
+    let mounts = format!(
+        "for file in /usr/bin/bwrap /usr/local/bin/bwrap /bin/bwrap; do \
+         if [ -f $file ]; then mount --bind {} $file; fi; done",
+        old.display()
+    );
+    let output = home.run_after(&mounts, &["doctor"]);
+    let text = String::from_utf8_lossy(&output.stdout);
+    for part in [
+        "bubblewrap 0.3.0",
+        "0.8 or newer is needed",
+        "install a newer bubblewrap",
+    ] {
+        assert!(text.contains(part), "{text}");
+    }
+    assert!(!text.contains("apt-get install bubblewrap"), "{text}");
 }

@@ -2,6 +2,7 @@
 
 use crate::{
     Layer, SandboxError, SpawnSpec,
+    bubblewrap_program::BubblewrapProgram,
     cpu_view::CpuView,
     error::IoContext,
     private_mounts::PrivateMounts,
@@ -15,12 +16,9 @@ use std::{
     io::{self, Seek, Write},
     os::fd::{AsRawFd, OwnedFd},
     path::{Path, PathBuf},
-    process::{Command, Stdio},
+    process::Command,
     sync::OnceLock,
 };
-
-const PROGRAM_CANDIDATES: [&str; 3] = ["/usr/bin/bwrap", "/usr/local/bin/bwrap", "/bin/bwrap"];
-pub(crate) const INSTALL_COMMAND: &str = "apt-get install bubblewrap";
 
 /// User and group id inside the sandbox; the number is arbitrary.
 const ID_IN_SANDBOX: &str = "1000";
@@ -84,50 +82,14 @@ impl Bubblewrap {
         if let Some(found) = FOUND.get() {
             return Ok(found);
         }
-        let program = PROGRAM_CANDIDATES
-            .iter()
-            .map(Path::new)
-            .find(|path| path.is_file())
-            .ok_or_else(|| SandboxError::Unavailable {
-                layer: Layer::Namespaces,
-                reason: format!(
-                    "bubblewrap is not installed ({}); install it: {INSTALL_COMMAND}",
-                    PROGRAM_CANDIDATES.join(", ")
-                ),
-            })?;
-        let output_of = |option: &str| {
-            Command::new(program)
-                .arg(option)
-                .env_clear()
-                .stdin(Stdio::null())
-                .output()
-                .map(|output| String::from_utf8_lossy(&output.stdout).into_owned())
-                .context(format_args!("cannot run {}", program.display()))
-        };
-        let help = output_of("--help")?;
-        for option in [
-            "--add-seccomp-fd",
-            "--size ",
-            "--as-pid-1",
-            "--json-status-fd",
-        ] {
-            if !help.contains(option) {
-                return Err(SandboxError::Unavailable {
-                    layer: Layer::Namespaces,
-                    reason: format!(
-                        "{} lacks {}; bubblewrap 0.8 or newer is needed",
-                        program.display(),
-                        option.trim()
-                    ),
-                });
-            }
-        }
+        let found = BubblewrapProgram::find().map_err(|problem| SandboxError::Unavailable {
+            layer: Layer::Namespaces,
+            reason: format!("{problem}; {}", problem.cure()),
+        })?;
         Ok(FOUND.get_or_init(|| Self {
-            program: program.to_path_buf(),
-            version: output_of("--version")
-                .map(|text| text.trim().to_owned())
-                .unwrap_or_default(),
-            disables_user_namespaces: help.contains("--disable-userns"),
+            program: found.path,
+            version: found.version,
+            disables_user_namespaces: found.help.contains("--disable-userns"),
         }))
     }
 

@@ -14,6 +14,7 @@ mod agent_user;
 mod answered_calls;
 mod bounded_log;
 mod bubblewrap;
+mod bubblewrap_program;
 mod caller_counters;
 mod cgroup;
 mod channel;

@@ -2,8 +2,7 @@
 
 use crate::{
     AgentProcess, Isolation, Layer, Limits, ReadLine, Runtime, SandboxError, SpawnError, SpawnSpec,
-    answered_calls,
-    bubblewrap::{self, Bubblewrap},
+    answered_calls, bubblewrap::Bubblewrap, bubblewrap_program::BubblewrapProgram,
 };
 use serde::Serialize;
 use std::{
@@ -85,6 +84,8 @@ fn field<'a>(text: &'a str, name: &str) -> Option<&'a str> {
 }
 
 fn probe_namespaces() -> Result<String, String> {
+    // Its cure is reported separately.
+    BubblewrapProgram::find().map_err(|problem| problem.to_string())?;
     let bubblewrap = Bubblewrap::find().map_err(|error| error.to_string())?;
     // Inside, the process is number one, has no capabilities, and sees only its own network.
     let status = run_cat(Layer::Namespaces, "/proc/self/status")?;
@@ -323,8 +324,8 @@ fn fix_namespaces(error: &str) -> String {
             "sysctl -w kernel.apparmor_restrict_unprivileged_userns=0",
         ),
     ];
-    if Bubblewrap::find().is_err() {
-        return bubblewrap::INSTALL_COMMAND.into();
+    if let Err(problem) = BubblewrapProgram::find() {
+        return problem.cure();
     }
     if error.contains("CAP_") || error.contains("file system for the bundle") {
         return "give the root service CAP_SYS_ADMIN, CAP_MKNOD and CAP_SYS_PTRACE (in Docker: docker run --privileged \
