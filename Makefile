@@ -35,7 +35,7 @@ export CARGO_INCREMENTAL := 0
 endif
 DEMO       := $(TARGET_DIR)/demo
 
-.PHONY: channels demo test tests-built tests-of-rust tests-of-python tests-of-api tests-of-agents tests-of-scripts test-release costs web wheel pictures test-api test-python test-learning fuzz busy load route-costs remote-slot crowd objects soak steady frames test-cgroup2 test-box test-engine lint format fidelity setup setup-test agents dist clean-demo help
+.PHONY: channels demo test tests-built tests-of-rust tests-of-python tests-of-api tests-of-agents tests-of-scripts test-release costs web wheel pictures test-api test-python test-learning fuzz busy load route-costs remote-slot crowd objects soak steady frames test-cgroup2 test-box test-engine test-first-hour lint format fidelity setup setup-test agents dist clean-demo help
 
 help:
 	@echo "make demo   run a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
@@ -45,6 +45,7 @@ help:
 	@echo "make test-release   build the release program and check its size, symbols and golden hashes"
 	@echo "make costs   measure the cost of building and testing, from fresh clones: ONLY=$(ONLY) ROUNDS=$(ROUNDS) COMMIT=$(COMMIT) JSON=$(JSON)"
 	@echo "make web    build the script of the replay pages: web/client/dist"
+	@echo "make test-first-hour   run the first hour of the guide in a fresh Debian: SUITE=$(SUITE)"
 	@echo "make wheel  build the Python package: $(TARGET_DIR)/wheels"
 	@echo "make test-api   validate the OpenAPI document, call every operation, generate two clients"
 	@echo "make test-python   build the Python package, install it in an empty environment, test it"
@@ -83,6 +84,13 @@ agents: setup
 dist: setup
 	$(CARGO) build --release --locked --package faceoff
 	docker/dist.sh "$(RELEASE)/faceoff" "$(TARGET_DIR)/dist"
+
+# The commands of the guide's first hour, by an ordinary user in a fresh Debian. Needs root and debootstrap; the first run downloads the
+# root file system.
+SUITE ?= bookworm
+test-first-hour: tests-built
+	command -v debootstrap >/dev/null || apt-get install -y debootstrap
+	python3 tests/first_hour/first_hour.py --program "$(TARGET_DIR)/debug/faceoff" --cache "$(TARGET_DIR)/first-hour" --suite $(SUITE)
 
 # Builds, checks and packs the release program, after a test of the check (docker/check-program.sh).
 test-release:
