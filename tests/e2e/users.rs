@@ -150,7 +150,7 @@ fn commands_invite_and_remove_users() {
     join(&server, &format!("{link}x"), &["--name", "Grace"])
         .expect_refusal(REFUSED, &["the server refused"]);
     join(&server, &link, &["--name", "<b>"])
-        .expect_refusal(USAGE_ERROR, &["--name", "letters, digits"]);
+        .expect_refusal(USAGE_ERROR, &["--name", "letters and digits"]);
     join(&server, &link, &[]).expect_refusal(REFUSED, &["name: expected the name"]);
     join(&server, &link, &["--name", "Grace", "--accept-terms", "1"])
         .expect_refusal(REFUSED, &["this season has no terms"]);
@@ -390,7 +390,7 @@ fn commands_register_teams_and_publish_announcements() {
         "{open}"
     );
     registration(&["divisions", "Open", "open"]).expect_refusal(REFUSED, &["listed twice"]);
-    registration(&["divisions", "<b>"]).expect_refusal(USAGE_ERROR, &["letters, digits"]);
+    registration(&["divisions", "<b>"]).expect_refusal(USAGE_ERROR, &["letters and digits"]);
     let with_divisions = registration(&["divisions", "Open", "Students"]).expect_success();
     assert!(
         with_divisions.contains("divisions: Open, Students"),

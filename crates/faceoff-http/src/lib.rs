@@ -25,7 +25,7 @@ pub use faceoff_service::{
     link_key::LinkKey,
     problem,
     rate_limits::{RateLimit, RateLimits},
-    services::partial_uploads::PARTIAL_UPLOADS_FOLDER,
+    services::partial_uploads::{PARTIAL_UPLOADS_FOLDER, remove_expired as remove_expired_uploads},
     transfer_rate::MinTransferRate,
 };
 pub use proxies::ProxyNetwork;

@@ -37,7 +37,7 @@ impl Page<'_> {
 pub(super) async fn page(State(app): State<App>) -> Result<Response, PageProblem> {
     render(&Page {
         frame: Frame::load(&app, "/downloads").await?,
-        downloads: app.config.downloads.list().await,
+        downloads: &app.config.downloads.list().await,
         source_url: app.config.source_url.as_deref(),
     })
 }

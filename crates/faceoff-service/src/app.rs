@@ -163,14 +163,16 @@ impl AppState {
         }
         let hash = credential::secret_hash(&self.config, headers);
         let caller = hash.and_then(|hash| self.recent_callers.find(&hash));
-        caller.unwrap_or(Precedence::Visitor)
+        caller.map_or(Precedence::Visitor, |caller| caller.precedence)
     }
 
     /// Whose requests this one is counted with: the caller's if the token was verified recently, else those of its address.
     pub fn request_source(&self, headers: &HeaderMap, network: Network) -> RequestSource {
         credential::secret_hash(&self.config, headers)
-            .filter(|hash| self.recent_callers.find(hash).is_some())
-            .map_or(RequestSource::Network(network), RequestSource::Caller)
+            .and_then(|hash| self.recent_callers.find(&hash))
+            .map_or(RequestSource::Network(network), |caller| {
+                RequestSource::Caller(caller.owner)
+            })
     }
 
     /// Counts a request with a token.

@@ -8,6 +8,7 @@ use crate::{
     credential::Credential,
     places::Precedence,
     problem::{Problem, ProblemKind},
+    recent_callers::RecentCaller,
     request_log,
 };
 use axum::{
@@ -22,6 +23,7 @@ use faceoff_store::{
 use faceoff_types::TeamId;
 use jiff::Timestamp;
 use std::sync::Arc;
+use uuid::Uuid;
 
 /// A caller with a valid token.
 #[derive(Debug, Clone)]
@@ -88,6 +90,12 @@ impl Caller {
         } else {
             Precedence::Team
         }
+    }
+
+    /// The id of the user, or of the team whose API client it is; `None`: the host.
+    fn owner(&self) -> Option<Uuid> {
+        let user = self.user().map(|user| user.id.as_uuid());
+        user.or_else(|| self.team().map(|team| team.id.as_uuid()))
     }
 
     /// Whether the caller acts for this team or is an organiser.
@@ -224,7 +232,11 @@ async fn authenticate(parts: &Parts, app: &App) -> Result<Option<Caller>, Proble
     app.check_rate(token.id)?;
     record_use(app, &token, now);
     let caller = Caller::new(token, secret_hash, principal);
-    app.recent_callers.insert(secret_hash, caller.precedence());
+    let recent = RecentCaller {
+        precedence: caller.precedence(),
+        owner: caller.owner(),
+    };
+    app.recent_callers.insert(secret_hash, recent);
     if let Some(team) = caller.team()
         && change_quota::is_counted(&parts.method, parts.uri.path())
     {

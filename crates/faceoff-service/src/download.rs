@@ -1,8 +1,8 @@
 //! Files that visitors download to develop agents on their own machines: the program, examples, a package.
 
 use bytes::Bytes;
-use std::{fs::File, io, path::PathBuf};
-use tokio::sync::OnceCell;
+use std::{fs::File, io, path::PathBuf, sync::Arc, time::SystemTime};
+use tokio::sync::Mutex;
 
 /// A file that the server offers.
 #[derive(Debug, Clone)]
@@ -31,43 +31,69 @@ pub struct ListedDownload {
     pub blake3: blake3::Hash,
 }
 
-/// The server's downloads. Their hashes are computed when they are first needed.
+/// The server's downloads. Their hashes are computed when they are first needed, and when a file has changed.
 #[derive(Debug, Default)]
 pub struct Downloads {
     offered: Vec<Download>,
-    listed: OnceCell<Vec<ListedDownload>>,
+    listed: Mutex<Listed>,
 }
+
+#[derive(Debug, Default)]
+struct Listed {
+    /// Size and time of each file when it was read.
+    versions: Vec<Option<Version>>,
+    downloads: Arc<[ListedDownload]>,
+}
+
+/// Size in bytes and time of the last change.
+type Version = (u64, Option<SystemTime>);
 
 impl Downloads {
     /// Offers these files.
     pub fn new(offered: Vec<Download>) -> Self {
         Self {
             offered,
-            listed: OnceCell::new(),
+            listed: Mutex::default(),
         }
     }
 
     /// All files, with size and hash. A file that cannot be read any more is left out.
-    pub async fn list(&self) -> &[ListedDownload] {
-        let listed = self.listed.get_or_init(async || {
-            let offered = self.offered.clone();
-            let listed = tokio::task::spawn_blocking(move || {
-                offered
-                    .into_iter()
-                    .filter_map(|download| {
-                        let name = download.name.clone();
-                        let listed = ListedDownload::new(download);
-                        listed
-                            .inspect_err(
-                                |error| tracing::warn!(name, %error, "a download cannot be read"),
-                            )
-                            .ok()
-                    })
-                    .collect()
+    pub async fn list(&self) -> Arc<[ListedDownload]> {
+        let mut listed = self.listed.lock().await;
+        let offered = self.offered.clone();
+        let known = std::mem::take(&mut listed.versions);
+        let current = Arc::clone(&listed.downloads);
+        let read = tokio::task::spawn_blocking(move || {
+            let versions: Vec<_> = offered.iter().map(Download::version).collect();
+            if versions == known {
+                return (versions, current);
+            }
+            let downloads = offered.into_iter().filter_map(|download| {
+                let name = download.name.clone();
+                ListedDownload::new(download)
+                    .inspect_err(|error| tracing::warn!(name, %error, "a download cannot be read"))
+                    .ok()
             });
-            listed.await.unwrap_or_default()
+            (versions, downloads.collect())
         });
-        listed.await
+        if let Ok((versions, downloads)) = read.await {
+            *listed = Listed {
+                versions,
+                downloads,
+            };
+        }
+        Arc::clone(&listed.downloads)
+    }
+}
+
+impl Download {
+    /// `None`: it has none, because it is in memory, or there is no file.
+    fn version(&self) -> Option<Version> {
+        let DownloadContent::File(path) = &self.content else {
+            return None;
+        };
+        let metadata = path.metadata().ok()?;
+        Some((metadata.len(), metadata.modified().ok()))
     }
 }
 

@@ -24,6 +24,15 @@ struct Receiver {
     connections: usize,
 }
 
+/// The partial uploads in use; no other one is taken over while this lives.
+pub(crate) struct InUse<'a>(MutexGuard<'a, HashMap<String, Receiver>>);
+
+impl InUse<'_> {
+    pub(crate) fn contains(&self, name: &str) -> bool {
+        self.0.contains_key(name)
+    }
+}
+
 /// The right to write to the file of a partial upload, until this is dropped.
 #[derive(Debug)]
 pub struct PartialUploadLock {
@@ -61,6 +70,11 @@ impl PartialUploads {
         };
         lock.guard = Some(file.lock_owned().await);
         lock
+    }
+
+    /// Locks the list of partial uploads that are being received or read.
+    pub(crate) fn in_use(&self) -> InUse<'_> {
+        InUse(self.receivers())
     }
 
     /// The receivers; a panic of another thread cannot leave one half-written.

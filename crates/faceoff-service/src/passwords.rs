@@ -38,6 +38,8 @@ const FREE_ATTEMPTS: u32 = 5;
 const FIRST_WAIT: SignedDuration = SignedDuration::from_secs(2);
 /// The delay does not grow beyond this.
 const LONGEST_WAIT: SignedDuration = SignedDuration::from_mins(5);
+/// More doublings of the first wait exceed the longest one.
+const MAX_DOUBLINGS: u32 = 20;
 /// Names whose wrong passwords are remembered. Beyond, those with the fewest are forgotten.
 const MAX_NAMES: usize = 10_000;
 /// Wrong passwords are forgotten this long after the last one.
@@ -60,6 +62,11 @@ struct NameKey([u8; 32]);
 impl NameKey {
     fn new(name: &str) -> Self {
         Self(*blake3::hash(name_skeleton(name).as_bytes()).as_bytes())
+    }
+
+    /// Of a user, whose name may look like that of another one in a database of an earlier version.
+    fn of_user(id: UserId) -> Self {
+        Self(*blake3::hash(id.as_uuid().as_bytes()).as_bytes())
     }
 }
 
@@ -95,7 +102,7 @@ impl Failures {
         let Some(doublings) = self.count.checked_sub(FREE_ATTEMPTS) else {
             return Timestamp::MIN;
         };
-        let factor = 1_i32.checked_shl(doublings).unwrap_or(i32::MAX).max(1);
+        let factor = 1_i32 << doublings.min(MAX_DOUBLINGS);
         let wait = FIRST_WAIT.saturating_mul(factor).min(LONGEST_WAIT);
         self.last_at.saturating_add(wait).unwrap_or(Timestamp::MAX)
     }
@@ -212,7 +219,7 @@ impl Passwords {
         now: Timestamp,
     ) -> Result<Option<UserId>, Problem> {
         let (id, hash) = account.unzip();
-        let name = NameKey::new(name);
+        let name = id.map_or_else(|| NameKey::new(name), NameKey::of_user);
         let place = self.take_place(client)?;
         // Counted before the hash is computed, since many attempts may run at once.
         self.count_attempt(name, id, now)?;

@@ -14,6 +14,7 @@ use std::{
     num::NonZeroU32,
     sync::atomic::{AtomicU32, Ordering},
 };
+use uuid::Uuid;
 
 /// A mean rate of requests, and how many may arrive at once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,8 +44,8 @@ const CLEANUP_INTERVAL: u32 = 4096;
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum RequestSource {
     Network(Network),
-    /// The hash of a secret that was verified recently.
-    Caller([u8; 32]),
+    /// A user or team with a token that was verified recently; `None`: the host.
+    Caller(Option<Uuid>),
 }
 
 /// Counts recent requests by network and by token.

@@ -8,6 +8,7 @@ use std::{
     sync::{Mutex, MutexGuard, PoisonError},
     time::{Duration, Instant},
 };
+use uuid::Uuid;
 
 /// Verified tokens in memory, at most: more than a large season's programs and browsers have.
 const MAX_CALLERS: usize = 10_000;
@@ -29,15 +30,23 @@ struct Generations {
     older: HashMap<SecretHash, Verified>,
 }
 
+/// Whose token it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct RecentCaller {
+    pub precedence: Precedence,
+    /// The id of the user, or of the team whose API client it is; `None`: the host.
+    pub owner: Option<Uuid>,
+}
+
 #[derive(Debug, Clone, Copy)]
 struct Verified {
-    caller: Precedence,
+    caller: RecentCaller,
     at: Instant,
 }
 
 impl RecentCallers {
     /// Whose token it is, if it was verified recently.
-    pub(crate) fn find(&self, hash: &SecretHash) -> Option<Precedence> {
+    pub(crate) fn find(&self, hash: &SecretHash) -> Option<RecentCaller> {
         let generations = self.lock();
         let found = generations.newer.get(hash);
         let found = found.or_else(|| generations.older.get(hash))?;
@@ -45,7 +54,7 @@ impl RecentCallers {
     }
 
     /// Remembers whose token it is that was just verified.
-    pub(crate) fn insert(&self, hash: SecretHash, caller: Precedence) {
+    pub(crate) fn insert(&self, hash: SecretHash, caller: RecentCaller) {
         let mut generations = self.lock();
         if generations.newer.len() >= MAX_CALLERS / 2 && !generations.newer.contains_key(&hash) {
             generations.older = mem::take(&mut generations.newer);
@@ -79,11 +88,16 @@ mod tests {
     fn callers_seen_long_ago_are_forgotten() {
         let callers = RecentCallers::default();
         for number in 0..3 * MAX_CALLERS {
-            callers.insert(hash(number), Precedence::Team);
+            let caller = |precedence| RecentCaller {
+                precedence,
+                owner: None,
+            };
+            callers.insert(hash(number), caller(Precedence::Team));
             // The first one makes requests all the time.
-            callers.insert(hash(0), Precedence::Organiser);
+            callers.insert(hash(0), caller(Precedence::Organiser));
         }
-        assert_eq!(callers.find(&hash(0)), Some(Precedence::Organiser));
+        let first = callers.find(&hash(0)).unwrap();
+        assert_eq!(first.precedence, Precedence::Organiser);
         assert_eq!(callers.find(&hash(1)), None);
         let newest = 3 * MAX_CALLERS - 1;
         let kept = (0..=newest).filter(|number| callers.find(&hash(*number)).is_some());

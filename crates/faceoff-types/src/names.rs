@@ -47,7 +47,8 @@ fn check(text: &str) -> Result<(), NameProblem> {
     let mut previous = ' ';
     let mut rest = text.chars().peekable();
     while let Some(c) = rest.next() {
-        let is_allowed = if is_combining_mark(c) {
+        // Marks that count as letters, such as vowel signs, are letters here, too.
+        let is_allowed = if is_combining_mark(c) && !c.is_alphabetic() {
             marks += 1;
             previous != ' ' && is_printable(c)
         } else if is_joiner(c) {

@@ -23,7 +23,7 @@ mod users;
 mod webhooks;
 mod workers;
 
-use anyhow::{Context, anyhow, bail};
+use anyhow::{Context, bail};
 pub use download::DownloadedFile;
 use faceoff_api::{
     API_BASE,
@@ -55,6 +55,8 @@ const READ_TIMEOUT: Duration = Duration::from_secs(60);
 #[error("the server refused ({status}, {title}): {detail}")]
 pub struct ApiError {
     pub status: StatusCode,
+    /// The kind of problem, as the page `/problems` names it.
+    pub kind: String,
     /// The kind of problem in words.
     pub title: String,
     /// Expected and received value, and the remedy.
@@ -73,15 +75,27 @@ pub fn is_refused_with(error: &anyhow::Error, status: StatusCode) -> bool {
 #[error("{0}")]
 pub struct Unreachable(pub String);
 
+/// An answer of a proxy or of another program.
+#[derive(Debug, thiserror::Error)]
+#[error("it answered {0}, but not as a Faceoff server does")]
+struct ForeignAnswer(StatusCode);
+
+/// Whether a proxy's or server's answer with this status may be another one later.
+fn is_temporary_status(status: StatusCode) -> bool {
+    status.is_server_error()
+        || [StatusCode::TOO_MANY_REQUESTS, StatusCode::REQUEST_TIMEOUT].contains(&status)
+}
+
 /// Pause before a request is repeated.
 const RETRY_PAUSE: Duration = Duration::from_secs(2);
 
 /// Whether the same request may succeed later: the server, or a proxy before it, restarts or has too much to do.
 fn is_temporary(error: &anyhow::Error) -> bool {
-    match error.downcast_ref::<ApiError>() {
-        Some(refused) => {
-            refused.status.is_server_error() || refused.status == StatusCode::TOO_MANY_REQUESTS
-        }
+    if let Some(refused) = error.downcast_ref::<ApiError>() {
+        return is_temporary_status(refused.status);
+    }
+    match error.downcast_ref::<ForeignAnswer>() {
+        Some(ForeignAnswer(status)) => is_temporary_status(*status),
         None => error.is::<Unreachable>(),
     }
 }
@@ -309,18 +323,24 @@ impl Client {
         }
         #[derive(Deserialize)]
         struct Problem {
+            r#type: String,
             title: String,
             detail: String,
         }
         let text = response.text().await.unwrap_or_default();
-        let Ok(Problem { title, detail }) = serde_json::from_str(&text) else {
-            return Err(
-                anyhow!("it answered {status}, but not as a Faceoff server does")
-                    .context(Unreachable(format!("talking to {base}"))),
-            );
+        let Ok(Problem {
+            r#type,
+            title,
+            detail,
+        }) = serde_json::from_str(&text)
+        else {
+            return Err(anyhow::Error::from(ForeignAnswer(status))
+                .context(Unreachable(format!("talking to {base}"))));
         };
+        let (_, kind) = r#type.rsplit_once('#').unwrap_or_default();
         Err(ApiError {
             status,
+            kind: kind.to_owned(),
             title,
             detail,
         }

@@ -134,6 +134,7 @@ mod tests {
     fn exit_after(status: u16) -> Exit {
         let error = ApiError {
             status: StatusCode::from_u16(status).unwrap(),
+            kind: String::new(),
             title: "Title".into(),
             detail: "detail".into(),
         };

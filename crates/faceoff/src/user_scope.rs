@@ -5,11 +5,15 @@ use std::{
     env,
     os::unix::process::CommandExt as _,
     path::Path,
-    process::{Command, Stdio},
+    process::{Child, Command, Stdio},
+    time::{Duration, Instant},
 };
 
 /// Set for the command in the scope, so that it starts no other one.
 const MARK: &str = "FACEOFF_IN_USER_SCOPE";
+
+/// Longest time until a manager has started a command.
+const TRIAL_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Continues this command in a scope, if there is a manager that offers one. Otherwise returns.
 pub fn enter() {
@@ -41,8 +45,24 @@ fn is_offered(cgroups: &Path, runtime_folder: &Path, systemd_run: &str) -> bool 
     }
     let mut trial = scope(systemd_run);
     let trial = trial.arg("true").stdin(Stdio::null());
-    let status = trial.stdout(Stdio::null()).stderr(Stdio::null()).status();
-    status.is_ok_and(|status| status.success())
+    let trial = trial.stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+    trial.is_ok_and(|mut trial| succeeds(&mut trial))
+}
+
+/// Waits for the end of a trial; one that takes too long has failed.
+fn succeeds(trial: &mut Child) -> bool {
+    let give_up_at = Instant::now() + TRIAL_TIMEOUT;
+    while Instant::now() < give_up_at {
+        match trial.try_wait() {
+            Ok(Some(status)) => return status.success(),
+            Ok(None) => std::thread::sleep(Duration::from_millis(10)),
+            Err(_) => return false,
+        }
+    }
+    // It may have ended meanwhile.
+    let _ = trial.kill();
+    let _ = trial.wait();
+    false
 }
 
 fn scope(systemd_run: &str) -> Command {

@@ -46,6 +46,14 @@ async fn downloads_are_listed_with_hashes_and_served() {
         assert_eq!(unchanged.status, 304);
     }
     assert!(page.body.contains(&format!("href=\"{source}\"")));
+    let page_of_changed = async {
+        fs::write(folder.path().join("faceoff.whl"), b"a newer package").unwrap();
+        site.get("/downloads", None).await.body
+    };
+    let newer = blake3::hash(b"a newer package").to_string();
+    assert!(page_of_changed.await.contains(&newer));
+    let file = site.get("/downloads/faceoff.whl", None).await;
+    assert_eq!(file.body, "a newer package");
     for unknown in ["gone", "..%2Fsecret", "faceoff.whl%00"] {
         let answer = site.get(&format!("/downloads/{unknown}"), None).await;
         assert_eq!(answer.status, 404, "{unknown}");

@@ -86,7 +86,7 @@ async fn invalid_or_taken_team_name_is_refused_with_reason() {
         .problem(409, "team-name-taken", &["Alpha", "another name"]);
     create("alpha")
         .await
-        .problem(409, "team-name-taken", &["alpha"]);
+        .problem(409, "team-name-taken", &["Alpha"]);
     let teams = site.get("/api/v1/teams", Some(ADMIN)).await.json(200);
     assert_eq!(teams.as_array().unwrap().len(), 1);
     create("")

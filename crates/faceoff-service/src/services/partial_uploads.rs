@@ -12,6 +12,7 @@ use crate::{
     boxed, free_space,
     partial_uploads::PartialUploadLock,
     problem::{Problem, ProblemKind},
+    upload_slots::UploadSlot,
 };
 use axum::body::Body;
 use faceoff_types::{ArchiveFormat, TeamId};
@@ -67,8 +68,10 @@ pub async fn receive_part(
     part: IncomingPart,
 ) -> Result<u64, Problem> {
     let team = caller.team.id;
-    free_space::check(app)?;
     let now = app.config.clock.now();
+    // Before the check of the free space, which expired uploads may occupy.
+    remove_expired(&app.config.upload_dir, now).await?;
+    free_space::check(app)?;
     let limits = UploadLimits::current(app).await?;
     check_may_upload(app, team, &limits).await?;
     let usage = app.store.upload_usage(team, now).await?;
@@ -85,10 +88,7 @@ pub async fn receive_part(
     let app = Arc::clone(app);
     let received = tokio::spawn(async move {
         let _slot = slot;
-        if part.offset == 0 {
-            make_room(&app, team, now)?;
-        }
-        append(&app, &file, part, &lock).await
+        append(&app, team, &file, part, &lock).await
     });
     received.await.map_err(Problem::internal)?
 }
@@ -96,23 +96,26 @@ pub async fn receive_part(
 /// Appends a part to the file, until it is complete or broken or its lock is taken over.
 async fn append(
     app: &AppState,
+    team: TeamId,
     path: &Path,
     part: IncomingPart,
     lock: &PartialUploadLock,
 ) -> Result<u64, Problem> {
-    let mut options = OpenOptions::new();
-    let opened = options.create(true).append(true).open(path).await;
-    let mut file = opened.map_err(free_space::write_problem)?;
+    let opened = match OpenOptions::new().append(true).open(path).await {
+        Err(error) if error.kind() == io::ErrorKind::NotFound && part.offset == 0 => {
+            create(app, team, path)
+        }
+        opened => opened,
+    };
+    let mut file = match opened {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            return Err(wrong_offset(part.offset, 0));
+        }
+        opened => opened.map_err(free_space::write_problem)?,
+    };
     let mut received = file.metadata().await.map_err(Problem::internal)?.len();
     if part.offset != received {
-        return Err(Problem::new(
-            ProblemKind::Conflict,
-            format!(
-                "expected the header Upload-Offset to be {received}, the number of bytes that have arrived, got {}; go on from there",
-                part.offset
-            ),
-        )
-        .with("received_bytes", received));
+        return Err(wrong_offset(part.offset, received));
     }
     let mut body = RateGuardedBody::new(part.body, app.config.limits.min_upload_rate);
     let appended = async {
@@ -154,7 +157,26 @@ async fn append(
     Ok(received)
 }
 
-/// The complete bundle of a partial upload. Its file stays where it is until [`ReceivedBundle::remove`].
+fn wrong_offset(offset: u64, received: u64) -> Problem {
+    Problem::new(
+        ProblemKind::Conflict,
+        format!(
+            "expected the header Upload-Offset to be {received}, the number of bytes that have arrived, got {offset}; go on from there"
+        ),
+    )
+    .with("received_bytes", received)
+}
+
+/// What an upload holds until it is stored; the lock is that of an upload in parts.
+pub(super) type UploadGuards = (UploadSlot, Option<PartialUploadLock>);
+
+/// Waits until no other request uses this partial upload.
+pub(super) async fn lock(app: &App, team: TeamId, bundle: blake3::Hash) -> PartialUploadLock {
+    let path = file_of(app, team, bundle);
+    app.partial_uploads.take_over(&name_of(&path)).await
+}
+
+/// The complete bundle of a partial upload, which `guards` have locked. Its file stays where it is until [`ReceivedBundle::remove`].
 ///
 /// # Errors
 /// `NotFound`: nothing has arrived. `Conflict`: the bytes that have arrived are not those of the bundle. `UnsupportedMediaType`.
@@ -162,11 +184,12 @@ pub(super) async fn complete(
     app: &App,
     team: TeamId,
     bundle: blake3::Hash,
-) -> Result<(ReceivedBundle, PartialUploadLock), Problem> {
+    guards: UploadGuards,
+) -> Result<(ReceivedBundle, UploadGuards), Problem> {
     let path = file_of(app, team, bundle);
-    let lock = app.partial_uploads.take_over(&name_of(&path)).await;
-    let read = tokio::task::spawn_blocking(move || read(path, bundle));
-    Ok((read.await.map_err(Problem::internal)??, lock))
+    // The thread has the guards: it reads on after the client has disconnected.
+    let read = tokio::task::spawn_blocking(move || Ok((read(path, bundle)?, guards)));
+    read.await.map_err(Problem::internal)?
 }
 
 fn read(path: PathBuf, expected: blake3::Hash) -> Result<ReceivedBundle, Problem> {
@@ -214,9 +237,8 @@ fn read(path: PathBuf, expected: blake3::Hash) -> Result<ReceivedBundle, Problem
 /// # Errors
 /// `NotFound`: nothing.
 pub async fn remove(app: &App, team: TeamId, bundle: blake3::Hash) -> Result<(), Problem> {
-    let path = file_of(app, team, bundle);
-    let _lock = app.partial_uploads.take_over(&name_of(&path)).await;
-    match tokio::fs::remove_file(path).await {
+    let _lock = lock(app, team, bundle).await;
+    match tokio::fs::remove_file(file_of(app, team, bundle)).await {
         Ok(()) => Ok(()),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Err(nothing_received(bundle)),
         Err(error) => Err(Problem::internal(error)),
@@ -259,35 +281,73 @@ fn name_of(file: &Path) -> String {
     name.to_string_lossy().into_owned()
 }
 
-/// Removes expired partial uploads of all teams, and the oldest ones of this team, until a new one has a place.
-fn make_room(app: &AppState, team: TeamId, now: Timestamp) -> Result<(), Problem> {
-    let folder = folder(app);
-    fs::create_dir_all(&folder).map_err(free_space::write_problem)?;
-    let prefix = format!("{team}-");
-    let mut of_team = Vec::new();
-    for entry in fs::read_dir(&folder).map_err(Problem::internal)? {
-        let entry = entry.map_err(Problem::internal)?;
-        // Another connection may have completed it meanwhile.
-        let Ok(modified) = entry.metadata().and_then(|metadata| metadata.modified()) else {
-            continue;
-        };
-        let modified = Timestamp::try_from(modified).unwrap_or(Timestamp::MIN);
-        if now.duration_since(modified) > LIFETIME {
-            remove_file(&entry.path())?;
-        } else if entry.file_name().to_string_lossy().starts_with(&prefix) {
-            of_team.push((modified, entry.path()));
+/// Removes the partial uploads of all teams to which nothing was added for a day.
+///
+/// # Errors
+/// If a file cannot be removed.
+pub async fn remove_expired(upload_dir: &Path, now: Timestamp) -> Result<(), Problem> {
+    let folder = upload_dir.join(PARTIAL_UPLOADS_FOLDER);
+    let removed = tokio::task::spawn_blocking(move || {
+        for (modified, path) in files_in(&folder)? {
+            if now.duration_since(modified) > LIFETIME {
+                allow_missing(fs::remove_file(path))?;
+            }
         }
-    }
-    of_team.sort();
-    let excess = (of_team.len() + 1).saturating_sub(app.config.limits.team_uploads);
-    of_team[..excess.min(of_team.len())]
-        .iter()
-        .try_for_each(|(_, path)| remove_file(path))
+        Ok(())
+    });
+    removed
+        .await
+        .map_err(Problem::internal)?
+        .map_err(|error: io::Error| Problem::internal(error))
 }
 
-fn remove_file(path: &Path) -> Result<(), Problem> {
-    match fs::remove_file(path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(Problem::internal(error)),
-        _ => Ok(()),
+/// Creates the file of a new partial upload, and removes the team's oldest ones if it has too many. Those in use stay.
+fn create(app: &AppState, team: TeamId, path: &Path) -> io::Result<tokio::fs::File> {
+    let folder = folder(app);
+    fs::create_dir_all(&folder)?;
+    // No other upload begins between the count and the creation.
+    let in_use = app.partial_uploads.in_use();
+    let prefix = format!("{team}-");
+    let mut of_team: Vec<(Timestamp, PathBuf)> = files_in(&folder)?
+        .into_iter()
+        .filter(|(_, path)| name_of(path).starts_with(&prefix))
+        .collect();
+    of_team.sort();
+    let excess = (of_team.len() + 1).saturating_sub(app.config.limits.team_uploads);
+    let unused = of_team
+        .iter()
+        .filter(|(_, path)| !in_use.contains(&name_of(path)));
+    for (_, path) in unused.take(excess) {
+        allow_missing(fs::remove_file(path))?;
+    }
+    let file = fs::OpenOptions::new()
+        .create(true)
+        .append(true)
+        .open(path)?;
+    Ok(tokio::fs::File::from_std(file))
+}
+
+/// The files of a folder with their times of change; none if there is no folder.
+fn files_in(folder: &Path) -> io::Result<Vec<(Timestamp, PathBuf)>> {
+    let entries = match fs::read_dir(folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+        entries => entries?,
+    };
+    let mut files = Vec::new();
+    for entry in entries {
+        let entry = entry?;
+        // Another request may have removed it meanwhile.
+        if let Ok(modified) = entry.metadata().and_then(|metadata| metadata.modified()) {
+            let modified = Timestamp::try_from(modified).unwrap_or(Timestamp::MIN);
+            files.push((modified, entry.path()));
+        }
+    }
+    Ok(files)
+}
+
+fn allow_missing(removed: io::Result<()>) -> io::Result<()> {
+    match removed {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        removed => removed,
     }
 }

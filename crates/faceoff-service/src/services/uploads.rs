@@ -2,13 +2,10 @@
 
 use super::{
     bundle_stream::{self, ReceivedBundle, SizeLimit},
-    partial_uploads,
+    partial_uploads::{self, UploadGuards},
     upload_limits::{UploadLimits, acquire_slot, check_may_upload, size_limit},
 };
-use crate::{
-    app::App, auth::TeamCaller, boxed, free_space, partial_uploads::PartialUploadLock,
-    problem::Problem, upload_slots::UploadSlot,
-};
+use crate::{app::App, auth::TeamCaller, boxed, free_space, problem::Problem};
 use axum::body::Body;
 use faceoff_store::{Actor, StoreError, Submission, Team};
 use faceoff_types::{ArchiveFormat, BundleRef, IdempotencyKey, TeamId};
@@ -47,37 +44,48 @@ pub async fn upload(
 ) -> Result<Submission, Problem> {
     let team = caller.team.id;
     free_space::check(app)?;
-    let earlier = match &incoming.key {
-        Some(key) => app.store.uploaded_with_key(team, key).await?,
-        None => None,
-    };
-    let slot = acquire_slot(app, team)?;
-    let (received, lock) = match incoming.source {
+    let (received, guards) = match incoming.source {
         BundleSource::Body { bytes, body } => {
+            let earlier = earlier_upload(app, team, incoming.key.as_ref()).await?;
+            let slot = acquire_slot(app, team)?;
             let received = receive(app, team, (bytes, body), earlier.as_ref()).await?;
-            (received, None)
+            if let Some(earlier) = earlier {
+                return same_bundle(earlier, &received.blake3);
+            }
+            (received, (slot, None))
         }
         BundleSource::Parts(hash) => {
-            if let Some(earlier) = earlier {
+            let lock = partial_uploads::lock(app, team, hash).await;
+            // Read under the lock: an earlier request with this key may just have made the submission.
+            if let Some(earlier) = earlier_upload(app, team, incoming.key.as_ref()).await? {
                 return same_bundle(earlier, &hash);
             }
+            let slot = acquire_slot(app, team)?;
             check_may_upload(app, team, &UploadLimits::current(app).await?).await?;
-            let (received, lock) = partial_uploads::complete(app, team, hash).await?;
-            (received, Some(lock))
+            partial_uploads::complete(app, team, hash, (slot, Some(lock))).await?
         }
     };
-    if let Some(earlier) = earlier {
-        return same_bundle(earlier, &received.blake3);
-    }
     // If the client disconnects, this handler is dropped. A separate task stores the received bundle nevertheless.
     let stored = tokio::spawn(store(
         Arc::clone(app),
         (caller.team.clone(), caller.actor()),
         received,
         (incoming.claimed_name, incoming.key),
-        (slot, lock),
+        guards,
     ));
     stored.await.map_err(Problem::internal)?
+}
+
+/// The submission that the team has uploaded with this key.
+async fn earlier_upload(
+    app: &App,
+    team: TeamId,
+    key: Option<&IdempotencyKey>,
+) -> Result<Option<Submission>, Problem> {
+    match key {
+        Some(key) => Ok(app.store.uploaded_with_key(team, key).await?),
+        None => Ok(None),
+    }
 }
 
 /// The submission that was uploaded with the same key, if its bundle is the same.
@@ -124,7 +132,7 @@ async fn store(
     (team, actor): (Team, Actor),
     received: ReceivedBundle,
     (claimed_name, key): (String, Option<IdempotencyKey>),
-    _guards: (UploadSlot, Option<PartialUploadLock>),
+    _guards: UploadGuards,
 ) -> Result<Submission, Problem> {
     let bundle = BundleRef {
         key: format!(
@@ -137,6 +145,7 @@ async fn store(
         blake3: received.blake3.to_string(),
         file_name: file_name(&claimed_name, received.format),
     };
+    let quota = UploadLimits::current(&app).await?.quota;
     let _permit = app
         .artifact_writes
         .acquire()
@@ -146,7 +155,6 @@ async fn store(
     artifacts.put_file(&bundle.key, &received.file).await?;
     let artifact = bundle.key.clone();
     let now = app.config.clock.now();
-    let quota = UploadLimits::current(&app).await?.quota;
     let created = app
         .store
         .create_submission_once(actor, team.id, bundle, key.as_ref(), &quota, now)

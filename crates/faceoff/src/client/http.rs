@@ -62,12 +62,9 @@ pub fn server_address(text: &str) -> String {
     let with_scheme = if text.contains("://") {
         text.to_owned()
     } else {
-        let host = text.split(['/', ':']).next().unwrap_or_default();
-        let scheme = if is_this_machine(host) {
-            "http"
-        } else {
-            "https"
-        };
+        let parsed = reqwest::Url::parse(&format!("http://{text}")).ok();
+        let is_local = parsed.is_some_and(|url| url.host_str().is_some_and(is_this_machine));
+        let scheme = if is_local { "http" } else { "https" };
         format!("{scheme}://{text}")
     };
     match reqwest::Url::parse(&with_scheme) {
@@ -115,6 +112,11 @@ mod tests {
             ),
             ("localhost:8080", "http://localhost:8080"),
             ("127.0.0.1:8080", "http://127.0.0.1:8080"),
+            ("[::1]:8080/board", "http://[::1]:8080"),
+            (
+                "localhost:8080@192.0.2.1",
+                "https://localhost:8080@192.0.2.1",
+            ),
             ("http://[::1]:8080/", "http://[::1]:8080"),
             ("https://größe.example", "https://xn--gre-6ka8i.example"),
         ] {

@@ -2,7 +2,8 @@
 //! perturbation alone.
 
 use super::{
-    Client, RETRY_PAUSE, Unreachable, is_refused_with, is_temporary, read_json, retry_while,
+    ApiError, Client, RETRY_PAUSE, Unreachable, is_refused_with, is_temporary, read_json,
+    retry_while,
 };
 use crate::packing::BundleFile;
 use anyhow::{Context, anyhow, bail};
@@ -56,11 +57,8 @@ impl PartialUpload<'_> {
                 Ok(()) => return Ok(()),
                 Err(error) => error,
             };
-            // The server has given up a stalled part, or has got less or more than this attempt knew.
-            let is_behind = [StatusCode::REQUEST_TIMEOUT, StatusCode::CONFLICT]
-                .into_iter()
-                .any(|status| is_refused_with(&error, status));
-            if !(is_interruption(&error) || is_behind) || Instant::now() >= give_up_at {
+            // The server has got less or more than this attempt knew.
+            if !(is_interruption(&error) || is_conflict(&error)) || Instant::now() >= give_up_at {
                 return Err(error);
             }
             tokio::time::sleep(RETRY_PAUSE).await;
@@ -115,6 +113,12 @@ impl PartialUpload<'_> {
             ).context(Unreachable("the upload has stalled".to_owned()))),
         }
     }
+}
+
+/// Whether the server has other parts than the request assumed. Other refusals with this status, such as the end of the season, last.
+fn is_conflict(error: &anyhow::Error) -> bool {
+    let refused = error.downcast_ref::<ApiError>();
+    refused.is_some_and(|refused| refused.kind == "conflict")
 }
 
 /// Whether an upload may go on after this failure: not if a quota is used up or the server's disk is full, which may last.
@@ -197,7 +201,7 @@ impl Client {
         };
         match submit().await {
             // The server's file is damaged, for example by a power failure.
-            Err(error) if is_refused_with(&error, StatusCode::CONFLICT) => {
+            Err(error) if is_conflict(&error) => {
                 let removed = self.send(self.request(Method::DELETE, &parts.path)).await;
                 // Without parts, the conflict has another reason.
                 removed.map_err(|_| error)?;

@@ -69,6 +69,7 @@ mod tests {
     fn unhealthy_server_is_a_failure_but_not_unreachable() {
         let refused = |status| ApiError {
             status,
+            kind: String::new(),
             title: "Not ready".into(),
             detail: "the database cannot be written".into(),
         };

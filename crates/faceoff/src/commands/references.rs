@@ -240,6 +240,7 @@ mod tests {
         let refused = |status: u16| -> anyhow::Result<()> {
             Err(crate::client::ApiError {
                 status: StatusCode::from_u16(status).unwrap(),
+                kind: String::new(),
                 title: String::new(),
                 detail: String::new(),
             }

@@ -5,6 +5,7 @@ mod archived_season;
 mod clock;
 mod data_folder;
 mod downloads;
+mod expired_uploads;
 mod http;
 mod live_season;
 mod monitoring;

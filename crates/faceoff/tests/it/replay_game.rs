@@ -132,7 +132,10 @@ fn positions_on_the_page_are_those_of_the_table() {
 #[test]
 fn archive_of_a_side_hides_the_other_sides_penalties() {
     let summary = summary(&first_game().join("side-1.zip"));
-    assert_eq!(summary["penalties"], Value::Array(Vec::new()));
+    // On a busy machine the side itself may have points for time.
+    for penalty in summary["penalties"].as_array().unwrap() {
+        assert_eq!(penalty["side"], 1, "{penalty}");
+    }
     assert_eq!(summary["seed"], Value::Null);
     let (_, page) = drawn(&first_game().join("side-1.zip"), "side.html", &[]);
     assert!(page.contains("From the archive of side 1: "));

@@ -113,13 +113,14 @@ mod tests {
             "http://127.0.0.1:8080",
             "http://localhost/",
             "http://[::1]:80",
+            "localhost",
         ] {
             assert!(is_local(local), "{local}");
         }
         for remote in [
             "https://faceoff.example.org",
             "http://192.0.2.1",
-            "localhost",
+            "localhost:8080@192.0.2.1",
             "",
         ] {
             assert!(!is_local(remote), "{remote}");

@@ -1,7 +1,7 @@
 //! The files of the page `/downloads`: this program, examples of agents, descriptions of the competition, and those of a folder.
 
 use crate::{commands::new::example_archives, competition::description_files};
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use faceoff_http::{Download, DownloadContent, Downloads};
 use std::path::{Path, PathBuf};
 
@@ -31,12 +31,21 @@ pub(super) fn downloads(folder: Option<&Path>) -> anyhow::Result<Downloads> {
     }
     if let Some(folder) = folder {
         let found = files_of(folder);
-        downloads.extend(found.with_context(|| {
+        let found = found.with_context(|| {
             format!(
                 "server.downloads_dir: reading the folder {}",
                 folder.display()
             )
-        })?);
+        })?;
+        for download in found {
+            ensure!(
+                downloads.iter().all(|other| other.name != download.name),
+                "server.downloads_dir: the server itself offers a file named {}; rename that in {}",
+                download.name,
+                folder.display()
+            );
+            downloads.push(download);
+        }
     }
     Ok(Downloads::new(downloads))
 }
@@ -61,7 +70,7 @@ fn files_of(folder: &Path) -> std::io::Result<Vec<Download>> {
         let is_plain = name
             .bytes()
             .all(|byte| byte.is_ascii_alphanumeric() || b"._-+".contains(&byte));
-        if is_plain && !name.starts_with('.') && path.is_file() {
+        if is_plain && !name.is_empty() && !name.starts_with('.') && path.is_file() {
             files.push(Download {
                 name: name.to_owned(),
                 about: about(name).to_owned(),

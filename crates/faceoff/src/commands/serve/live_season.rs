@@ -1,7 +1,7 @@
 //! Serves a season that is not archived: API, pages, worker slots and schedule in one process.
 
 use super::{
-    clock,
+    clock, expired_uploads,
     http::serve_http,
     monitoring,
     priority::low_priority_runtime,
@@ -135,6 +135,8 @@ async fn serve(
             shutdown,
         )
     });
+    let upload_dir = site.upload_dir.clone();
+    tasks.spawn(|shutdown| expired_uploads::remove(upload_dir, clock.clone(), shutdown));
     tasks.spawn(|shutdown| clock::watch(clock.clone(), data_dir, shutdown));
     tasks.spawn(|shutdown| {
         faceoff_worker::run_schedule(store.clone(), Arc::clone(competition()), clock, shutdown)

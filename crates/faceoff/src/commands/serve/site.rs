@@ -31,7 +31,7 @@ pub(super) struct Site {
     pub(super) address: SocketAddr,
     pub(super) link_key: LinkKey,
     pub(super) clock: Clock,
-    upload_dir: PathBuf,
+    pub(super) upload_dir: PathBuf,
     downloads: Arc<Downloads>,
     /// Held as long as the season is served.
     _lock: File,
