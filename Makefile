@@ -14,6 +14,8 @@ WORKERS  ?= 200
 SLEEP_S  ?= 10
 # test-engine: 1 also compiles the program in an image.
 WHOLE    ?=
+# test-first-hour: version of Debian.
+SUITE    ?= bookworm
 # costs: see its target.
 ONLY     ?=
 ROUNDS   ?= 1
@@ -45,13 +47,13 @@ help:
 	@echo "make test-release   build the release program and check its size, symbols and golden hashes"
 	@echo "make costs   measure the cost of building and testing, from fresh clones: ONLY=$(ONLY) ROUNDS=$(ROUNDS) COMMIT=$(COMMIT) JSON=$(JSON)"
 	@echo "make web    build the script of the replay pages: web/client/dist"
-	@echo "make test-first-hour   run the first hour of the guide in a fresh Debian: SUITE=$(SUITE)"
 	@echo "make wheel  build the Python package: $(TARGET_DIR)/wheels"
 	@echo "make test-api   validate the OpenAPI document, call every operation, generate two clients"
 	@echo "make test-python   build the Python package, install it in an empty environment, test it"
 	@echo "make test-learning   train the learning examples from scratch, and test the libraries that need torch (8 GB)"
 	@echo "make test-cgroup2   test the sandbox's limits on cgroup v2, in a virtual machine without v1"
 	@echo "make test-box   build the images' file systems without a container engine, and start the programs in them"
+	@echo "make test-first-hour   run the first hour of the guide in a fresh Debian: SUITE=$(SUITE)"
 	@echo "make test-engine   build the images with Docker, and run a day in containers; WHOLE=1 also compiles there"
 	@echo "make fuzz   fuzz the parsers with almost valid input: MINUTES=$(MINUTES)"
 	@echo "make channels   print the rates of the channels between agents that remain"
@@ -85,12 +87,13 @@ dist: setup
 	$(CARGO) build --release --locked --package faceoff
 	docker/dist.sh "$(RELEASE)/faceoff" "$(TARGET_DIR)/dist"
 
-# The commands of the guide's first hour, by an ordinary user in a fresh Debian. Needs root and debootstrap; the first run downloads the
-# root file system.
-SUITE ?= bookworm
-test-first-hour: tests-built
-	command -v debootstrap >/dev/null || apt-get install -y debootstrap
+# The commands of the guide's first hour, by an ordinary user in a fresh Debian, and `eval` and `doctor` on hosts that lack something. As
+# root. The first run makes the Debian (SUITE) from its packages, which takes over a minute.
+test-first-hour: setup
+	@docker/setup.sh first-hour
+	$(CARGO) build --locked --workspace --bins --tests
 	python3 tests/first_hour/first_hour.py --program "$(TARGET_DIR)/debug/faceoff" --cache "$(TARGET_DIR)/first-hour" --suite $(SUITE)
+	python3 tests/first_hour/hosts.py --program "$(TARGET_DIR)/debug/faceoff" --cache "$(TARGET_DIR)/first-hour" --suite $(SUITE)
 
 # Builds, checks and packs the release program, after a test of the check (docker/check-program.sh).
 test-release:
@@ -142,6 +145,7 @@ tests-of-scripts:
 	python3 docker/test_check_program.py
 	python3 tests/costs/test_costs.py
 	python3 tests/words/test_words.py
+	python3 tests/first_hour/test_guide.py
 
 # Measures HEAD or COMMIT from fresh clones and prints a table; run it on an idle machine. ONLY: some of demo, test, page, store, release,
 # crates, lines. ROUNDS: of demo, test and release. JSON=FILE also writes the numbers there. TMPDIR=FOLDER: folder of the clones.

@@ -8,6 +8,7 @@
 #   docker/setup.sh steady   also a CPU load generator for repeated tests
 #   docker/setup.sh cgroup2  also a virtual machine for the tests of cgroup v2
 #   docker/setup.sh box      also tools to build images without a container engine
+#   docker/setup.sh first-hour   also tools to make a Debian and its network
 #   docker/setup.sh engine   also Docker, tools for its base images, and other tools that save images
 #
 # As root it installs them with apt-get; otherwise it prints the command and fails.
@@ -65,6 +66,10 @@ if [ "$purpose" = box ]; then
     need curl curl
     need ip iproute2
     python3 -c 'import ensurepip' 2>/dev/null || missing="$missing python3-venv"
+fi
+if [ "$purpose" = first-hour ]; then
+    need debootstrap debootstrap
+    need ip iproute2
 fi
 if [ "$purpose" = engine ]; then
     need dockerd docker.io

@@ -24,6 +24,7 @@ mod cpu_accounting;
 mod cpu_clock;
 mod cpu_counters;
 mod cpu_view;
+mod cures;
 mod error;
 mod exit_cause;
 mod fd_passing;

@@ -2,7 +2,7 @@
 
 use crate::{
     AgentProcess, Isolation, Layer, Limits, ReadLine, Runtime, SandboxError, SpawnError, SpawnSpec,
-    answered_calls, bubblewrap::Bubblewrap, bubblewrap_program::BubblewrapProgram,
+    answered_calls, bubblewrap::Bubblewrap, bubblewrap_program::BubblewrapProgram, cures::cure,
 };
 use serde::Serialize;
 use std::{
@@ -71,7 +71,7 @@ fn probe(layer: Layer) -> HostFeature {
         Err(error) => HostFeature {
             layer,
             available: false,
-            cure: Some(fix_for(layer, &error)),
+            cure: Some(cure(layer, &error)),
             found: error,
         },
     }
@@ -266,85 +266,4 @@ fn make_bundle(layers: &[Layer]) -> io::Result<(tempfile::TempDir, PathBuf)> {
     fs::set_permissions(&bundle, fs::Permissions::from_mode(0o755))?;
     fs::set_permissions(outer.path(), fs::Permissions::from_mode(outer_mode))?;
     Ok((outer, bundle))
-}
-
-/// How to provide a layer.
-fn fix_for(layer: Layer, error: &str) -> String {
-    match layer {
-        Layer::Namespaces => fix_namespaces(error),
-        Layer::Seccomp => {
-            "use a kernel with CONFIG_SECCOMP_FILTER=y (every distribution's since 2014), and give a root service in a container \
-             CAP_SYS_PTRACE; in Docker: docker run --cap-add SYS_PTRACE"
-                .into()
-        }
-        Layer::CgroupMemory | Layer::CgroupPids | Layer::CgroupCpu => fix_cgroups(),
-        Layer::Rlimits => {
-            format!(
-                "raise the service's own hard limits, e.g. ulimit -Hn {}",
-                Limits::default().open_files
-            )
-        }
-    }
-}
-
-/// systemd can delegate cgroups of version 2 to an ordinary user; version 1 needs root.
-fn fix_cgroups() -> String {
-    const DOCKER_HINT: &str = "in Docker: docker run --privileged --cgroupns=private";
-    if Path::new("/sys/fs/cgroup/cgroup.controllers").exists() {
-        format!(
-            "run the service as root, or as a systemd service whose unit says [Service] Delegate=yes; from a \
-             shell: systemd-run --user --scope -p Delegate=yes faceoff serve; {DOCKER_HINT}"
-        )
-    } else {
-        format!(
-            "run the service as root, or let root give it a cgroup: for c in memory pids cpu cpuacct freezer; do mkdir \
-             -p /sys/fs/cgroup/$c/agents; chown -R USER /sys/fs/cgroup/$c/agents; echo PID > \
-             /sys/fs/cgroup/$c/agents/cgroup.procs; done; {DOCKER_HINT}"
-        )
-    }
-}
-
-/// The usual settings that prevent an ordinary user from creating namespaces, in the order in which they take effect.
-fn fix_namespaces(error: &str) -> String {
-    /// File of a setting, the value that blocks namespaces, and the command that changes it.
-    const SWITCHES: [(&str, &str, &str); 3] = [
-        (
-            "/proc/sys/kernel/unprivileged_userns_clone",
-            "0",
-            "sysctl -w kernel.unprivileged_userns_clone=1",
-        ),
-        (
-            "/proc/sys/user/max_user_namespaces",
-            "0",
-            "sysctl -w user.max_user_namespaces=15000",
-        ),
-        (
-            "/proc/sys/kernel/apparmor_restrict_unprivileged_userns",
-            "1",
-            "sysctl -w kernel.apparmor_restrict_unprivileged_userns=0",
-        ),
-    ];
-    if let Err(problem) = BubblewrapProgram::find() {
-        return problem.cure();
-    }
-    if error.contains("CAP_") || error.contains("file system for the bundle") {
-        return "give the root service CAP_SYS_ADMIN, CAP_MKNOD and CAP_SYS_PTRACE (in Docker: docker run --privileged \
-                --cgroupns=private), or run it as an ordinary user"
-            .into();
-    }
-    // With this error the namespaces were created, and only the mount of /proc was refused.
-    if error.contains("mount proc") {
-        return "provide a /proc without masked files, so that agents can mount their own; in Docker: docker run \
-                --security-opt systempaths=unconfined"
-            .into();
-    }
-    let switch = SWITCHES.iter().find(|(file, blocking_value, _)| {
-        fs::read_to_string(file).is_ok_and(|value| value.trim() == *blocking_value)
-    });
-    match switch {
-        Some((.., command)) => (*command).to_owned(),
-        None => "allow user namespaces; in Docker: docker run --security-opt seccomp=docker/seccomp.json --security-opt \
-                 apparmor=unconfined --security-opt systempaths=unconfined"
-            .into(),
-    }
 }

@@ -1,7 +1,7 @@
 //! The cgroup of one agent: one folder (*leaf*) in each hierarchy that has a needed controller.
 
 use super::{
-    files,
+    NOT_MOUNTED, files,
     freezer::Freezer,
     hierarchy::{Hierarchies, Hierarchy, Version},
     leaf::{kill_and_thaw, leaf_name, remove_leaf},
@@ -93,11 +93,9 @@ impl AgentCgroup {
         let name = leaf_name();
         for (layer, controller) in enforced {
             let unavailable = |reason: String| SandboxError::Unavailable { layer, reason };
-            let hierarchy = hierarchies.find(controller).ok_or_else(|| {
-                unavailable(format!(
-                    "no cgroup hierarchy with the controller {controller} is mounted"
-                ))
-            })?;
+            let hierarchy = hierarchies
+                .find(controller)
+                .ok_or_else(|| unavailable(format!("{NOT_MOUNTED} {controller}")))?;
             let shared_controllers: Vec<&str> = if hierarchy.version == Version::V2 {
                 all_controllers
                     .iter()

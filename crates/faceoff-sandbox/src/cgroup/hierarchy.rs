@@ -1,7 +1,7 @@
 //! Cgroup hierarchies of the host. A *controller* limits one resource, such as memory; a *hierarchy* is a mounted tree of cgroups with
 //! one or more controllers. This module finds them, and the place where the service can create cgroups.
 
-use super::files;
+use super::{NOT_OFFERED, files};
 use crate::{SandboxError, error::IoContext};
 use std::{
     cell::RefCell,
@@ -120,7 +120,7 @@ impl Hierarchy {
         if let Some(missing) = controllers.iter().find(|name| !has_word(&offered, name)) {
             return Err(io::Error::new(
                 io::ErrorKind::Unsupported,
-                format!("{} does not offer the controller {missing}", dir.display()),
+                format!("{} {NOT_OFFERED} {missing}", dir.display()),
             ));
         }
         let control = dir.join("cgroup.subtree_control");

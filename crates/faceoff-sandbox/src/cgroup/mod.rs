@@ -14,3 +14,8 @@ mod stale;
 pub(crate) use agent::{AgentCgroup, ExceededLimit};
 pub(crate) use leaf::kill_and_thaw;
 pub(crate) use stale::sweep;
+
+/// Beginning of the error if a controller cannot be reached at all; its name follows.
+pub(crate) const NOT_MOUNTED: &str = "no mounted cgroup hierarchy has the controller";
+/// Part of the error if the service's cgroup may not use a controller; its name follows.
+pub(crate) const NOT_OFFERED: &str = "does not offer the controller";
