@@ -19,7 +19,7 @@ const LIST_WIDE_ELEMENTS: &str = "[...document.querySelectorAll('body *')]
     .filter(element => element.getBoundingClientRect().right > innerWidth + 1 && !element.closest('.wide'))
     .map(element => element.outerHTML.slice(0, 120)).slice(-3)";
 
-/// The windows and colour schemes in which pages are checked.
+/// The viewports (sizes of the browser window) and colour schemes in which pages are checked.
 const VIEWS: [View; 4] = [
     View::DESKTOP,
     View::PHONE.dark(),

@@ -55,7 +55,7 @@ fn backup_during_evaluation_restores_running_evaluation() {
     let [data, backup] = ["data", "backup"].map(in_scratch);
     let server = Server::start(&data, CONFIG);
     let team = Team::create(&server, "Phoenix");
-    let submission = team.submit(&server, &bundle::reference("striker", scratch.path()));
+    let submission = team.submit(&server, &bundle::example_agent("striker", scratch.path()));
     let evaluation = team.evaluate(&server, &submission);
     let _ = server.poll(&evaluation, &server.admin_token, |answer| {
         answer["progress"]["episodes_done"].as_u64() >= Some(2)

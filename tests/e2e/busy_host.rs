@@ -142,7 +142,7 @@ fn evaluate_day(
         .iter()
         .map(|name| {
             let team = Team::create(&server, name);
-            let verdict = team.submit(&server, &bundle::reference(name, scratch));
+            let verdict = team.submit(&server, &bundle::example_agent(name, scratch));
             assert_eq!(verdict["state"], "valid", "{name}: {verdict:#}");
             (team, verdict)
         })
@@ -276,7 +276,7 @@ fn http_threads_yield_and_avoid_agent_cpus() {
     let team = Team::create(&server, "Held");
     let id = team.upload(
         &server,
-        bundle::pack(&bundle::reference("hold", scratch.path())),
+        bundle::pack(&bundle::example_agent("hold", scratch.path())),
     );
     let verdict = team.verdict(&server, &id);
     assert_eq!(verdict["state"], "valid", "{verdict:#}");

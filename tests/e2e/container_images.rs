@@ -105,7 +105,7 @@ fn append<W: io::Write>(archive: &mut tar::Builder<W>, name: &str, bytes: &[u8])
 #[test]
 fn image_and_bundle_of_same_program_get_same_score() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let folder = bundle::reference("striker", scratch.path());
+    let folder = bundle::example_agent("striker", scratch.path());
     let read = |path: &Path| fs::read(path).expect("it can be read");
     let path_in_image = |path: &Path| {
         path.display()

@@ -7,7 +7,7 @@ use faceoff_tests::{bundle, server::Server};
 fn killed_server_scores_evaluation_like_local_evaluator() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let data_dir = scratch.path().join("data");
-    let striker = bundle::reference("striker", scratch.path());
+    let striker = bundle::example_agent("striker", scratch.path());
 
     let mut server = Server::start(&data_dir, CONFIG);
     let team = Team::create(&server, "Phoenix");

@@ -22,7 +22,7 @@ fn demo_evaluates_a_day_and_serves_its_board() {
         .arg("--bundle")
         .arg(repository().join("agents/hold"))
         .arg("--bundle")
-        .arg(bundle::reference("striker", scratch.path()))
+        .arg(bundle::example_agent("striker", scratch.path()))
         .arg("--bundle")
         .arg(repository().join("agents/reckless"))
         .env(

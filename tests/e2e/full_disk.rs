@@ -177,7 +177,7 @@ fn assert_undisturbed(
 ) {
     let finished = team.wait_until_finished(&disk.server, evaluation);
     assert_eq!(finished["state"], "finished", "{finished:#}");
-    upgrade::verify(&disk.server, evaluation, &team.token, scratch);
+    upgrade::verify_dataset(&disk.server, evaluation, &team.token, scratch);
     let mut dataset = dataset(&disk.server, evaluation, &team.token);
     let shards = entry(&mut dataset, "calibration.json");
     for shard in shards["shards"].as_array().expect("it lists the shards") {

@@ -1,7 +1,7 @@
 //! Actions of agents (joint commands for one step) that could break the simulation. Each is either refused as the agent's
 //! fault or simulated; none is a fault of the platform, which would give the agent another try.
 
-use crate::{CONFIG, Team, upgrade::verify};
+use crate::{CONFIG, Team, upgrade::verify_dataset};
 use faceoff_tests::{
     bundle::{pack, python_agent, python_bundle},
     server::Server,
@@ -209,6 +209,6 @@ fn extreme_valid_actions_are_simulated_and_verified() {
             "{name}"
         );
         assert_eq!(done["result"]["tasks"]["prepare"]["episodes"], 4, "{name}");
-        verify(&server, &evaluation, &team.token, scratch.path());
+        verify_dataset(&server, &evaluation, &team.token, scratch.path());
     }
 }

@@ -253,7 +253,7 @@ fn repeatedly_killed_server_ends_run_like_undisturbed_one() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let [killed_data, undisturbed_data] =
         ["killed", "undisturbed"].map(|name| scratch.path().join(name));
-    let striker = bundle::reference("striker", scratch.path());
+    let striker = bundle::example_agent("striker", scratch.path());
 
     // Two servers with copies of one data folder: the same season secret, day, team and evaluation.
     let server = Server::start(&killed_data, CONFIG);

@@ -7,7 +7,7 @@ use crate::{
     python_packages::python3_ml_config,
 };
 use faceoff_tests::{
-    bundle::{python_agent, python_bundle, reference},
+    bundle::{example_agent, python_agent, python_bundle},
     packages::test_bundle,
     server::Server,
 };
@@ -65,7 +65,7 @@ fn local_evaluation_uses_rules_and_limits_of_server_stage() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
     let out = scratch.path().join("out");
-    let hold = reference("hold", scratch.path());
+    let hold = example_agent("hold", scratch.path());
     let output = run(&eval_args(&hold, &server.url, &out, &["--task", "hit"])).expect_success();
     for text in [
         "stage “Qualifying”, revision 1",
@@ -116,7 +116,7 @@ fn unsupported_bundle_or_server_is_refused_with_reason() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), &python3_ml_config());
     let out = scratch.path().join("out");
-    let hold = reference("hold", scratch.path());
+    let hold = example_agent("hold", scratch.path());
     let assert_failure = |code, bundle: &Path, url: &str, options: &[&str], words: &[&str]| {
         let errors = run(&eval_args(bundle, url, &out, options)).expect_failure(code);
         for word in words {

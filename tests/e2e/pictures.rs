@@ -39,7 +39,7 @@ fn pictures_of_pages_are_taken() {
     let mut contestants = Vec::new();
     for name in ["hold", "striker", "reckless"] {
         let team = Team::create(&server, name);
-        let submission = team.submit(&server, &bundle::reference(name, scratch.path()));
+        let submission = team.submit(&server, &bundle::example_agent(name, scratch.path()));
         assert_eq!(submission["state"], "valid", "{submission:#}");
         contestants.push((team, submission));
     }

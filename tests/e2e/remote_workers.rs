@@ -80,7 +80,7 @@ fn worker_config(nats_address: SocketAddr, slots: usize) -> String {
 fn queue_evaluation(data_dir: &Path, scratch: &Path, config: &str) -> (String, Team) {
     let server = Server::start(data_dir, config);
     let team = Team::create(&server, "Phoenix");
-    let submission = team.submit(&server, &bundle::reference("striker", scratch));
+    let submission = team.submit(&server, &bundle::example_agent("striker", scratch));
     assert_eq!(submission["state"], "valid", "{submission:#}");
     let pause = json!({ "reason": "Until the workers are connected" });
     let paused = server.post("/api/v1/queue/pause", &server.admin_token, &pause);

@@ -6,7 +6,7 @@ use crate::{
     commands::{REFUSED, USAGE_ERROR, admin, faceoff, member},
 };
 use faceoff_tests::{
-    bundle::{python_agent, python_bundle, reference},
+    bundle::{example_agent, python_agent, python_bundle},
     server::Server,
 };
 use serde_json::json;
@@ -74,7 +74,7 @@ fn stage_refuses_other_runtimes_and_names_accepted_ones() {
     let status = faceoff(&status, "").expect_success();
     assert!(status.contains("excluded from the next cutoff"), "{status}");
     admin(&server, &["start-day"]).expect_refusal(REFUSED, &["that the stage accepts"]);
-    let native_submission = team.submit(&server, &reference("striker", scratch.path()));
+    let native_submission = team.submit(&server, &example_agent("striker", scratch.path()));
     assert_eq!(
         (&native_submission["state"], &native_submission["runtime"]),
         (&json!("valid"), &json!("native"))

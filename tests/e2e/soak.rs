@@ -9,7 +9,7 @@ use crate::{
     remote_workers::fake_worker::FakeWorker, score_locally, start_day, upgrade, without_times,
 };
 use faceoff_tests::{
-    bundle::{pack, python_agent, python_bundle, reference},
+    bundle::{example_agent, pack, python_agent, python_bundle},
     faketime::SystemClock,
     nats::Nats,
     server::{Server, TIMEOUT, http},
@@ -379,7 +379,7 @@ fn disturbed_server_reaches_undisturbed_results() {
         clock.environment(),
     );
     let server = &disk.server;
-    let striker = reference("striker", folder);
+    let striker = example_agent("striker", folder);
     let contestants = [
         Contestant::with_python_agent(server, folder, "holds", HOLD),
         Contestant::with_python_agent(server, folder, "swings", SWING),
@@ -476,7 +476,7 @@ fn disturbed_server_reaches_undisturbed_results() {
         let out = tempfile::tempdir().expect("a scratch folder can be made");
         // The end of the last evaluation releases the day.
         let _ = server.poll(evaluation, token, |answer| !answer["released_at"].is_null());
-        upgrade::verify(server, evaluation, token, out.path());
+        upgrade::verify_dataset(server, evaluation, token, out.path());
         let manifest = entry(&mut dataset(server, evaluation, token), "manifest.json");
         let bundle = &contestant.bundle_without_pauses;
         let local = score_locally(bundle, &manifest, episodes, &out.path().join("local"));

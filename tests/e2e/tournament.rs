@@ -77,7 +77,7 @@ fn commands_run_a_tournament_from_opening_to_close() {
     let scratch = tempfile::tempdir().unwrap();
     let server = Server::start(&scratch.path().join("data"), CONFIG);
     let teams = TEAMS.map(|name| Team::create(&server, name));
-    let hold = bundle::reference("hold", scratch.path());
+    let hold = bundle::example_agent("hold", scratch.path());
     let submissions = teams.each_ref().map(|team| {
         let submission = team.submit(&server, &hold);
         assert_eq!(submission["state"], "valid", "{submission:#}");

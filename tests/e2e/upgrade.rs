@@ -69,8 +69,8 @@ fn get(server: &Server, path: &str, token: &str) -> Value {
     answer.json().expect("the API speaks JSON")
 }
 
-/// Downloads a dataset and verifies it with `faceoff verify`.
-pub(crate) fn verify(server: &Server, evaluation: &str, token: &str, folder: &Path) {
+/// Downloads the dataset of an evaluation and verifies it with `faceoff verify`.
+pub(crate) fn verify_dataset(server: &Server, evaluation: &str, token: &str, folder: &Path) {
     let answer = server.get(&format!("{evaluation}/dataset"), Some(token));
     assert_eq!(answer.status(), 200, "the dataset of {evaluation}");
     let file = folder.join("dataset.zip");
@@ -193,7 +193,7 @@ fn first_release_data_folder_is_upgraded_and_continued() {
 
     // Datasets with episodes of both versions pass verification.
     for name in ["day one Alpha", "day two Alpha"] {
-        verify(
+        verify_dataset(
             &server,
             &recorded.path("evaluations", name),
             alpha,

@@ -1,4 +1,5 @@
-//! Bundles (the folder or archive of an agent, as a team uploads it): the reference agents, and small Python agents written by a test.
+//! Bundles (the folder or archive of an agent, as a team uploads it): the example agents of `agents/`, and small Python agents written by a
+//! test.
 
 use crate::{program, repository};
 use flate2::{Compression, write::GzEncoder};
@@ -7,12 +8,12 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The folder of a reference agent, with its program. A compiled agent is copied below `scratch`.
+/// The folder of one of the example agents in `agents/`, with its program. A compiled agent is copied below `scratch`.
 ///
 /// # Panics
 /// If the agent is unknown or cannot be copied.
 #[must_use]
-pub fn reference(name: &str, scratch: &Path) -> PathBuf {
+pub fn example_agent(name: &str, scratch: &Path) -> PathBuf {
     let source = repository().join("agents").join(name);
     if name != "striker" {
         return source;

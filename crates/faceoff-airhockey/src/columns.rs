@@ -36,7 +36,7 @@ pub fn recording_columns() -> RecordingColumns {
 #[must_use]
 pub fn action_space() -> ActionSpace {
     ActionSpace {
-        is_stated: true,
+        agents_choose_layout: true,
         layouts: Interpolation::ALL.map(Into::into).into(),
     }
 }

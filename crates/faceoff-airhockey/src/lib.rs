@@ -4,7 +4,6 @@
 //!
 //! This crate starts no process, opens no file and reads no clock.
 
-mod arena;
 mod columns;
 mod end_description;
 mod env;
@@ -12,10 +11,10 @@ mod game_record;
 mod magnitudes;
 mod running_game;
 mod running_side;
+mod simulation_setup;
 mod simulator;
 mod world;
 
-pub use arena::Arena;
 pub use columns::{action_space, recording_columns};
 pub use end_description::describe_end;
 pub use game_record::{
@@ -23,7 +22,8 @@ pub use game_record::{
     SideFault, SideStep,
 };
 pub use running_game::{FinishedGame, RunningGame};
-pub use simulator::{AirHockey, arena, checked_magnitudes, simulator};
+pub use simulation_setup::SimulationSetup;
+pub use simulator::{AirHockey, checked_magnitudes, simulation_setup, simulator};
 pub use world::AirHockeyWorld;
 
 use faceoff_scoring::{
@@ -257,7 +257,7 @@ fn profile(profile: Profile, letter: char, title: &str, description: &str) -> Pr
         title: title.to_owned(),
         description: description.to_owned(),
         letter,
-        is_ablated: ABLATION_PROFILES.contains(&profile),
+        is_in_ablations: ABLATION_PROFILES.contains(&profile),
     }
 }
 
@@ -377,7 +377,10 @@ mod tests {
             other.check().unwrap_err()
         };
         for (problem, words) in [
-            (refused(|other| other.actions.is_stated = false), "layouts"),
+            (
+                refused(|other| other.actions.agents_choose_layout = false),
+                "layouts",
+            ),
             (refused(|other| other.actions.layouts.clear()), "layout"),
             (refused(|other| other.profiles.clear()), "profile"),
             (refused(|other| other.recording.limits.truncate(3)), "limit"),

@@ -2,12 +2,12 @@
 //! to a goal, a foul or another end.
 
 use crate::{
-    arena::Arena,
     game_record::{
         Effect, GameSink, GameStepRow, RallyEnding, RallyEntry, RallyRow, RallyStart, Response,
         SideFault, SideStep,
     },
     running_side::RunningSide,
+    simulation_setup::SimulationSetup,
 };
 use faceoff_episode::{NonFiniteObservation, Question, RecordError};
 use faceoff_sim::{Command, Divergence, Game, Interpolation};
@@ -20,15 +20,15 @@ use faceoff_types::{
 /// provides the responses, from two processes or from a recording:
 ///
 /// ```
-/// # use faceoff_airhockey::{Arena, RallyEntry, RunningGame, Response};
+/// # use faceoff_airhockey::{SimulationSetup, RallyEntry, RunningGame, Response};
 /// # use faceoff_episode::{AnswerTiming, NullSink};
 /// # use faceoff_sim::AirHockeyProfile;
 /// # use faceoff_sim::Interpolation;
 /// # use faceoff_types::{GameEnd, GameLimits, Seed, Side};
 /// # let seed = Seed::from_number(1);
 /// # let timing = AnswerTiming { computation_time_s: 0.001, host_time_s: 0.0, cpu_time_s: None };
-/// let arena = Arena::new(AirHockeyProfile::Ideal, seed, seed.model_mismatch());
-/// let mut game = RunningGame::begin(&arena, 900, GameLimits::default(), NullSink);
+/// let setup = SimulationSetup::new(AirHockeyProfile::Ideal, seed, seed.model_mismatch());
+/// let mut game = RunningGame::begin(&setup, 900, GameLimits::default(), NullSink);
 /// while game.end().is_none() {
 ///     game.start_rally(Side::BOTH.map(|side| RallyEntry::Ready {
 ///         startup_s: game.needs_start(side).then_some(0.1),
@@ -83,11 +83,11 @@ pub struct FinishedGame<S> {
 }
 
 impl<S: GameSink> RunningGame<S> {
-    /// A game of `steps` control steps before its first rally; the arena's seed is the game's.
-    pub fn begin(arena: &Arena, steps: u32, limits: GameLimits, sink: S) -> Self {
+    /// A game of `steps` control steps before its first rally; the setup's seed is the game's.
+    pub fn begin(setup: &SimulationSetup, steps: u32, limits: GameLimits, sink: S) -> Self {
         Self {
             // The interpolation is set before each rally.
-            game: arena.game([Interpolation::Cubic; 2]),
+            game: setup.game([Interpolation::Cubic; 2]),
             planned_steps: steps,
             limits,
             sides: Side::BOTH.map(RunningSide::new),

@@ -1,6 +1,6 @@
 //! The simulator of air hockey, as slots and verification use it.
 
-use crate::Arena;
+use crate::SimulationSetup;
 use crate::{
     competition,
     env::env,
@@ -30,7 +30,7 @@ pub struct AirHockey {
 }
 
 impl AirHockey {
-    /// With a changed description, such as other tiers.
+    /// The simulator of a competition with a changed description, such as other tiers.
     #[must_use]
     pub fn with_competition(competition: Competition) -> Self {
         Self {
@@ -38,7 +38,7 @@ impl AirHockey {
         }
     }
 
-    /// Its description.
+    /// The description of the competition: tasks, profiles, tiers.
     #[must_use]
     pub const fn competition(&self) -> &Arc<Competition> {
         &self.competition
@@ -63,7 +63,7 @@ impl Simulator for AirHockey {
         &self,
         conditions: &Conditions<'_>,
     ) -> Result<Box<dyn Environment>, InvalidConditions> {
-        Ok(Box::new(arena(conditions)?))
+        Ok(Box::new(simulation_setup(conditions)?))
     }
 
     fn check_playable(&self, magnitudes: &Magnitudes, mismatch_seed: Seed) -> Result<(), String> {
@@ -71,11 +71,11 @@ impl Simulator for AirHockey {
     }
 }
 
-/// The arena of an evaluation or of a game.
+/// The setup of the simulations of an evaluation or of a game.
 ///
 /// # Errors
 /// If the simulator has no such ruleset, profile or magnitudes.
-pub fn arena(conditions: &Conditions<'_>) -> Result<Arena, InvalidConditions> {
+pub fn simulation_setup(conditions: &Conditions<'_>) -> Result<SimulationSetup, InvalidConditions> {
     let Conditions {
         ruleset,
         profile,
@@ -83,7 +83,7 @@ pub fn arena(conditions: &Conditions<'_>) -> Result<Arena, InvalidConditions> {
         seed,
         mismatch_seed,
     } = *conditions;
-    Ok(Arena::with_ruleset(
+    Ok(SimulationSetup::with_ruleset(
         AirHockeyRuleset::find(ruleset).ok_or(InvalidConditions::Ruleset(ruleset))?,
         profile.try_into().map_err(InvalidConditions::Profile)?,
         &settings(perturbations).map_err(InvalidConditions::Magnitudes)?,

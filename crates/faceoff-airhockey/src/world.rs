@@ -1,6 +1,6 @@
 //! The world of an episode of a qualifying task.
 
-use crate::arena::Arena;
+use crate::simulation_setup::SimulationSetup;
 use faceoff_episode::{Environment, StateColumns, World};
 use faceoff_sim::{ConstraintValues, EPISODE_STEPS, Episode, EpisodeState, Impact, Interpolation};
 use faceoff_types::{ActionLayout, EpisodeEnd, Seed, Task, UnknownTask, Violations};
@@ -13,7 +13,7 @@ pub struct AirHockeyWorld {
     state: EpisodeState,
     constraints: ConstraintValues,
     /// The constraint values in the order of the recordings' columns.
-    limits: [f64; 4],
+    constraint_values: [f64; 4],
 }
 
 impl AirHockeyWorld {
@@ -22,7 +22,7 @@ impl AirHockeyWorld {
         Self {
             state: simulation.state(),
             constraints,
-            limits: limits(&constraints),
+            constraint_values: constraint_values(&constraints),
             simulation,
         }
     }
@@ -53,7 +53,7 @@ impl AirHockeyWorld {
 }
 
 /// In the order of the recordings' columns.
-const fn limits(constraints: &ConstraintValues) -> [f64; 4] {
+const fn constraint_values(constraints: &ConstraintValues) -> [f64; 4] {
     [
         constraints.joint_pos,
         constraints.joint_vel,
@@ -74,7 +74,7 @@ impl World for AirHockeyWorld {
     fn step(&mut self, action: &[f64]) -> Option<EpisodeEnd> {
         let outcome = self.simulation.step(action);
         self.constraints = outcome.constraints;
-        self.limits = limits(&outcome.constraints);
+        self.constraint_values = constraint_values(&outcome.constraints);
         self.state = self.simulation.state();
         outcome.end
     }
@@ -96,8 +96,8 @@ impl World for AirHockeyWorld {
         record_state(&self.state, columns);
     }
 
-    fn limits(&self) -> &[f64] {
-        &self.limits
+    fn constraint_values(&self) -> &[f64] {
+        &self.constraint_values
     }
 
     fn as_any(&self) -> &dyn Any {
@@ -133,7 +133,7 @@ fn put_optional<const N: usize>(columns: &mut dyn StateColumns, values: Option<&
     }
 }
 
-impl Environment for Arena {
+impl Environment for SimulationSetup {
     fn seed(&self, task: Task, index: u32) -> Seed {
         self.episode_seed(task, index)
     }

@@ -118,7 +118,7 @@ pub struct EventsQuery {
 #[derive(Debug, Clone, Default, Serialize, Deserialize, IntoParams)]
 #[serde(default, deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
-pub struct FollowQuery {
+pub struct EventStreamQuery {
     /// Comma-separated filters; an event is sent if it matches one of them. Topics (`board`, `queue`, `season`, …),
     /// subjects (`stage:ID`, `team:ID`, `tournament:ID`, …) or event kinds (`day_released`). Default: all events that
     /// the caller may see.

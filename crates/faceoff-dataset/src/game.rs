@@ -16,7 +16,7 @@ mod verify;
 mod violations;
 
 pub use archive::{GameArchives, RecordedGame, remove_game};
-pub use conditions::game_arena;
+pub use conditions::game_simulation_setup;
 pub use course::{GameCourse, GamePositions, SideCourse};
 pub use files::{GAME_FILE, GAME_FILES, side_file};
 pub use rallies::ListedRally;

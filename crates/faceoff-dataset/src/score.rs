@@ -28,7 +28,7 @@ use std::{collections::BTreeMap, path::Path, sync::Arc};
 pub(crate) struct Measurements {
     pub timings: Vec<AnswerTiming>,
     /// How far each limit is exceeded, step by step, in the order of the recording's columns. Violated if above 0.
-    pub limits: Vec<f64>,
+    pub constraint_values: Vec<f64>,
 }
 
 /// Collects the data of a task for scoring, in order of play.
@@ -74,7 +74,7 @@ impl Tally {
     pub fn add_steps(&mut self, episode: u32, measured: &Measurements) {
         let count = self.violations.len();
         for (step, timing) in measured.timings.iter().enumerate() {
-            let limits = &measured.limits[step * count..][..count];
+            let limits = &measured.constraint_values[step * count..][..count];
             let step = u32::try_from(step).unwrap_or(u32::MAX);
             self.add_step(episode, step, *timing, limits);
         }

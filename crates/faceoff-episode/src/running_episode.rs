@@ -15,15 +15,15 @@ use std::fmt;
 /// provides the answers, from a process, a recording or a function:
 ///
 /// ```
-/// # use faceoff_airhockey::{Arena};
+/// # use faceoff_airhockey::{SimulationSetup};
 /// # use faceoff_episode::{AnswerTiming, RunningEpisode, NullSink};
 /// # use faceoff_sim::AirHockeyProfile;
 /// # use faceoff_airhockey::Interpolation;
 /// # use faceoff_types::{Phase, Seed, Task};
 /// # let hit = Task::new("hit");
 /// # let seed = Seed::from_number(1);
-/// let arena = Arena::new(AirHockeyProfile::Ideal, seed, seed.model_mismatch());
-/// let mut running = RunningEpisode::begin(&arena, hit, 0, Some(Interpolation::Linear.into()), NullSink)?;
+/// let setup = SimulationSetup::new(AirHockeyProfile::Ideal, seed, seed.model_mismatch());
+/// let mut running = RunningEpisode::begin(&setup, hit, 0, Some(Interpolation::Linear.into()), NullSink)?;
 /// let outcome = loop {
 ///     let joint_positions = running.question()?.observation[6..13].to_vec();
 ///     let timing = AnswerTiming {

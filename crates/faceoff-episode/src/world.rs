@@ -25,9 +25,9 @@ pub trait World: Send + Sync {
     /// Writes the present true state, in the order of the competition's columns
     /// ([`RecordingColumns::state`](faceoff_types::RecordingColumns::state)).
     fn record_state(&self, columns: &mut dyn StateColumns);
-    /// How far the limits are exceeded after the last step, in the order of
-    /// [`RecordingColumns::limits`](faceoff_types::RecordingColumns::limits). Violated if above 0.
-    fn limits(&self) -> &[f64];
+    /// The value of each constraint after the last step: by how much its limit is exceeded. They are in the order of
+    /// [`RecordingColumns::limits`](faceoff_types::RecordingColumns::limits). A constraint is violated if its value is above 0.
+    fn constraint_values(&self) -> &[f64];
     /// The world itself, for sinks that know its type.
     fn as_any(&self) -> &dyn Any;
 }

@@ -4,7 +4,7 @@
 mod address;
 mod day_progress;
 mod days;
-mod heading;
+mod info;
 mod rows;
 mod sort;
 
@@ -26,7 +26,7 @@ use faceoff_service::{
     views::{board, board_timeline::BoardTimeline, season::SeasonSummary, visibility::Visibility},
 };
 use faceoff_types::Task;
-use heading::Heading;
+use info::BoardInfo;
 use rows::{Context, Group, OverallRow, TaskRow, common_conditions};
 use sort::Sort;
 use std::sync::Arc;
@@ -37,10 +37,10 @@ const POLL_SECONDS: u32 = 10;
 #[derive(Template)]
 #[template(path = "board.html")]
 struct OverallPage {
-    /// Its name in the heading.
+    /// Short title of the competition, for the title of the page.
     competition: String,
     frame: Frame,
-    heading: Heading,
+    board_info: BoardInfo,
     days: Days,
     sort: Sort,
     /// BLAKE3 hash of the season's secret, from which all episodes are drawn.
@@ -94,7 +94,7 @@ pub(super) async fn overall(
     let page = OverallPage {
         competition: competition.short_title.clone(),
         frame: Frame::for_app(&app, season.name, "/"),
-        heading: Heading::load(&app, &board, &visibility, &address, season.paused).await?,
+        board_info: BoardInfo::load(&app, &board, &visibility, &address, season.paused).await?,
         days: Days::new(&board, &timeline, &address),
         commitment: season.commitment,
         conditions: common_conditions(&board.rows),
@@ -113,7 +113,7 @@ pub(super) async fn overall(
 #[template(path = "task.html")]
 struct TaskPage {
     frame: Frame,
-    heading: Heading,
+    board_info: BoardInfo,
     days: Days,
     sort: Sort,
     title: String,
@@ -162,7 +162,7 @@ pub(super) async fn by_task(
     let context = Context::new(&board, timeline.previous_board.as_ref(), sort.is_by_rank());
     render_with_etag(&TaskPage {
         frame: Frame::for_app(&app, season.name, path.clone()),
-        heading: Heading::load(&app, &board, &visibility, &address, season.paused).await?,
+        board_info: BoardInfo::load(&app, &board, &visibility, &address, season.paused).await?,
         days: Days::new(&board, &timeline, &address),
         title: info.title.clone(),
         aim: info.aim.clone(),

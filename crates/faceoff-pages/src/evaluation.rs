@@ -209,7 +209,7 @@ impl TimingFigures {
 struct Page {
     frame: Frame,
     /// Heading and points of each kind of violation.
-    violation_heads: Vec<figures::ViolationHead>,
+    violation_headers: Vec<figures::ViolationHeader>,
     id: EvaluationId,
     team: String,
     agent: Option<String>,
@@ -288,7 +288,7 @@ pub(super) async fn page(
         _ => None,
     };
     render(&Page {
-        violation_heads: figures::violation_heads(app.config.competition()),
+        violation_headers: figures::violation_headers(app.config.competition()),
         frame: Frame::load(&app, "").await?,
         id,
         team: view.team_name.to_string(),

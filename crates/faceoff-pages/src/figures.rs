@@ -1,4 +1,4 @@
-//! Number formats of the pages. Units are stated in the heads of tables.
+//! Number formats of the pages. Units are stated in the headers of tables.
 
 use faceoff_api::views::task::TaskView;
 use faceoff_scoring::TIER_CHANGE_RESAMPLES;
@@ -188,7 +188,7 @@ pub(super) const fn tier_symbol(tier: &Tier) -> &'static str {
     }
 }
 
-/// Definition of a tier, for the legend and the group heads of tables.
+/// Definition of a tier, for the legend and the group headers of tables.
 fn tier_bounds(tier: Tier, bounds: &TierBounds) -> String {
     let (deployable, improvable) = (bounds.deployable(), bounds.improvable());
     match tier {
@@ -216,14 +216,14 @@ impl TierLabel {
 }
 
 /// The head of a column of violations.
-pub(super) struct ViolationHead {
+pub(super) struct ViolationHeader {
     pub(super) title: String,
     pub(super) points: String,
 }
 
-/// The heads of the columns of all kinds of violations.
-pub(super) fn violation_heads(competition: &Competition) -> Vec<ViolationHead> {
-    let head = |info: &ViolationInfo| ViolationHead {
+/// The column headers of all kinds of violations.
+pub(super) fn violation_headers(competition: &Competition) -> Vec<ViolationHeader> {
+    let head = |info: &ViolationInfo| ViolationHeader {
         title: capitalised(&info.column),
         points: info.points_with_unit(),
     };

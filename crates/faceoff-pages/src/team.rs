@@ -47,7 +47,7 @@ struct Page {
     /// The newest first.
     days: Vec<DayResult>,
     violations: Vec<TaskViolations>,
-    violation_heads: Vec<crate::figures::ViolationHead>,
+    violation_headers: Vec<crate::figures::ViolationHeader>,
     /// Running and queued evaluations of today.
     open_evaluations: Vec<EvaluationView>,
     /// Visible to the team and organisers only.
@@ -117,7 +117,7 @@ pub(super) async fn page(
             .map(|info| info.title.clone())
             .collect(),
         day_charts: days::charts(&history.rows, &variation, app.config.competition()),
-        violation_heads: crate::figures::violation_heads(app.config.competition()),
+        violation_headers: crate::figures::violation_headers(app.config.competition()),
         violations: days::violations(&history.rows, app.config.competition()),
         days: history
             .rows

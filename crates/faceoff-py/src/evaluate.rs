@@ -5,7 +5,7 @@ use crate::{
     actions::{ActionFormat, ActionMode},
     errors::{OrderError, argument_error, catch_panic, check_perturbations, simulator_error},
 };
-use faceoff_airhockey::Arena;
+use faceoff_airhockey::SimulationSetup;
 use faceoff_airhockey::{TASKS, competition};
 use faceoff_episode::{AnswerTiming, NullSink, RunningEpisode};
 use faceoff_scoring::{StepTimes, score_evaluation, score_task};
@@ -28,7 +28,7 @@ const UNTIMED: AnswerTiming = AnswerTiming {
 #[pyclass(frozen, module = "faceoff._native")]
 pub struct Evaluation {
     /// Ruleset, perturbations, and the simulated arm of all episodes.
-    arena: Arena,
+    setup: SimulationSetup,
     profile: Profile,
     seed: Seed,
     /// Settings that differ from the ruleset's.
@@ -65,10 +65,10 @@ impl Evaluation {
         let settings: PerturbationSettings = serde_json::from_str(perturbations)
             .map_err(|error| argument_error("perturbations", "magnitudes of factors", error))?;
         let magnitudes = check_perturbations(&settings)?;
-        let arena = py.detach(|| {
+        let setup = py.detach(|| {
             catch_panic(|| {
                 let ruleset = AirHockeyRuleset::CURRENT;
-                Ok(Arena::with_ruleset(
+                Ok(SimulationSetup::with_ruleset(
                     ruleset,
                     profile,
                     &settings,
@@ -78,7 +78,7 @@ impl Evaluation {
             })
         })?;
         Ok(Self {
-            arena,
+            setup,
             profile: profile.name(),
             seed,
             variation: Variation {
@@ -120,7 +120,7 @@ impl Evaluation {
         let task = parse_task(task)?;
         let running = catch_panic(|| {
             let layout = Some(interpolation.into());
-            let begun = RunningEpisode::begin(&self.arena, task, episode, layout, NullSink);
+            let begun = RunningEpisode::begin(&self.setup, task, episode, layout, NullSink);
             begun.map_err(|error| simulator_error(&error.to_string()))
         })?;
         Ok(PolicyEpisode {

@@ -16,7 +16,7 @@ pub fn potential(task: AirHockeyTask, episode: &Episode) -> f64 {
     let world = episode.world();
     let puck = world.puck();
     let [x, y, _] = puck.pose;
-    let [mallet_x, mallet_y, _] = world.kinematics(0).end_effector.origin.lane(0);
+    let [mallet_x, mallet_y, _] = world.kinematics(0).end_effector.origin.to_array();
     let (dx, dy) = (mallet_x - TABLE.base_x_m - x, mallet_y - y);
     let distance = (dx * dx + dy * dy).sqrt();
     let distance_cost = PER_METRE_TO_PUCK * distance.min(1.0);

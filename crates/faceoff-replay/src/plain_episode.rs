@@ -15,7 +15,11 @@ pub(crate) struct PlainRecording {
 impl PlainRecording {
     pub fn step(&mut self, row: &StepRow<'_>, competition: &Competition) {
         let sample = row.step + 1;
-        let limits = competition.recording.limits.iter().zip(row.world.limits());
+        let limits = competition
+            .recording
+            .limits
+            .iter()
+            .zip(row.world.constraint_values());
         for (name, value) in limits.filter(|(_, value)| **value > 0.0) {
             let known = self
                 .violations

@@ -76,7 +76,7 @@ impl Clip {
 fn mallet(robot: usize, angle: impl Fn(usize) -> f64) -> [f64; 2] {
     let q: [f64; DOFS] = std::array::from_fn(angle);
     // The kinematics can compute several arms at once; the only one here is lane 0.
-    let centre = Kinematics::new(&q).cylinder_centre().lane(0);
+    let centre = Kinematics::new(&q).cylinder_centre().to_array();
     let [x, y, _] = table_from_robot(robot, centre);
     [x, y]
 }

@@ -3,7 +3,7 @@
 use super::sse::{LAST_EVENT_ID, sse_response, take_place};
 use crate::event_reader::{EventReader, Subscription};
 use axum::{Extension, extract::State, http::HeaderMap, response::IntoResponse};
-use faceoff_api::requests::FollowQuery;
+use faceoff_api::requests::EventStreamQuery;
 use faceoff_notify::NoticeFilter;
 use faceoff_service::{
     app::App,
@@ -26,7 +26,7 @@ use futures::stream;
 #[utoipa::path(
     get, path = "/events/stream", tag = "public", security((), ("team" = []), ("organiser" = [])),
     params(
-        FollowQuery,
+        EventStreamQuery,
         ("Last-Event-ID" = Option<String>, Header, description = "id of the last received event", example = "4711"),
     ),
     responses(
@@ -39,7 +39,7 @@ use futures::stream;
 pub(crate) async fn follow_events(
     OptionalCaller(caller): OptionalCaller,
     State(app): State<App>,
-    QueryParams(query): QueryParams<FollowQuery>,
+    QueryParams(query): QueryParams<EventStreamQuery>,
     shutdown: Option<Extension<Shutdown>>,
     headers: HeaderMap,
 ) -> Result<impl IntoResponse, Problem> {

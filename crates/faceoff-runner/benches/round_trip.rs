@@ -14,8 +14,8 @@
 mod instant;
 
 use criterion::{BatchSize, Criterion};
-use faceoff_airhockey::Arena;
 use faceoff_airhockey::HIT;
+use faceoff_airhockey::SimulationSetup;
 use faceoff_episode::NullSink;
 use faceoff_runner::{
     AgentEnvironment, KernelCounters, Observer, Session, ShardSpec, play_shard, run_shard,
@@ -244,8 +244,8 @@ fn bench_control_steps(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("control step");
     group.sample_size(20);
     let seed = Seed::from_number(1);
-    let arena = Arena::new(AirHockeyProfile::Evaluation, seed, seed.model_mismatch());
-    let world = || arena.episode(faceoff_sim::AirHockeyTask::Prepare, 0, Interpolation::Cubic);
+    let setup = SimulationSetup::new(AirHockeyProfile::Evaluation, seed, seed.model_mismatch());
+    let world = || setup.episode(faceoff_sim::AirHockeyTask::Prepare, 0, Interpolation::Cubic);
     group.bench_function("simulator alone", |bencher| {
         bencher.iter_batched(
             || {

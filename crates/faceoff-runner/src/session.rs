@@ -277,11 +277,12 @@ fn hello(
     let ready =
         answer::parse_ready(&answer.bytes, actions).map_err(|fault| answer.to_error(fault))?;
     match stated {
-        Some(stated) if actions.is_stated && ready.layout.code() != Some(stated) => Err(answer
-            .to_error(AgentFaultKind::WrongMessage {
+        Some(stated) if actions.agents_choose_layout && ready.layout.code() != Some(stated) => {
+            Err(answer.to_error(AgentFaultKind::WrongMessage {
                 expected: format!("ready with interpolation {stated}, as agent.toml says"),
                 got: format!("ready with interpolation {}", ready.layout),
-            })),
+            }))
+        }
         _ => Ok((ready.layout, answer.wait.charged().as_secs_f64())),
     }
 }

@@ -55,7 +55,8 @@ pub fn sealed_grant(headers: &HeaderMap) -> Option<&str> {
     value.to_str().ok()?.strip_prefix("Grant ")
 }
 
-/// The token of a header `Authorization: Bearer TOKEN`; `None` if it has another form. The token may be quoted, and alone.
+/// The token of a header `Authorization: Bearer TOKEN`; `None` if it has another form. Two common mistakes are accepted: a token in
+/// quotation marks, and a token without the word `Bearer`.
 fn bearer_token(value: &HeaderValue) -> Option<&str> {
     let text = value.to_str().ok()?.trim();
     let token = match text.split_once(' ') {

@@ -23,7 +23,7 @@ const PROFILES: [AirHockeyProfile; 2] = [AirHockeyProfile::Ideal, AirHockeyProfi
 /// Control steps of a golden game: enough for several rallies (the parts of a game from a serve to a goal or foul), and for goals.
 const GAME_STEPS: u32 = 3000;
 
-/// Control steps of one stroke of [`strike`].
+/// Control steps of one stroke of [`scripted_action`].
 const STROKE_STEPS: u32 = 40;
 
 /// Seed of all golden episodes and games.
@@ -102,13 +102,13 @@ fn start_game(profile: AirHockeyProfile) -> Game {
     })
 }
 
-/// Runs an episode to its end with [`strike`]; returns the hash of all observations and states.
+/// Runs an episode to its end with [`scripted_action`]; returns the hash of all observations and states.
 #[must_use]
 pub fn episode_hash(mut episode: Episode) -> String {
     let mut hash = Hash::default();
     loop {
         hash.add(episode.observation());
-        let action = strike(episode.observation(), episode.steps());
+        let action = scripted_action(episode.observation(), episode.steps());
         let outcome = episode.step(&action);
         let state = episode.state();
         hash.add(&state.puck);
@@ -149,13 +149,13 @@ impl From<ViolatedGroups> for Violations {
     }
 }
 
-/// Continues a game for `steps` control steps, both robots with [`strike`]; returns the hash of
+/// Continues a game for `steps` control steps, both robots with [`scripted_action`]; returns the hash of
 /// observations, pucks, ends of rallies and windows (counts of violations). The last two are hashed as their `Debug` text, so a field of
 /// these types cannot be renamed without a change of the hash.
 pub fn game_hash(game: &mut Game, steps: u32) -> String {
     let mut hash = Hash::default();
     for _ in 0..steps {
-        let actions = [0, 1].map(|robot| strike(game.observation(robot), game.steps()));
+        let actions = [0, 1].map(|robot| scripted_action(game.observation(robot), game.steps()));
         for robot in 0..2 {
             hash.add(game.observation(robot));
         }
@@ -167,11 +167,12 @@ pub fn game_hash(game: &mut Game, steps: u32) -> String {
     hash.digits()
 }
 
-/// A simple agent, so that the hashes cover contacts: in strokes of 40 control steps it moves the mallet from behind the
-/// puck through the puck's position. `observation` is in the robot's base frame and starts with the puck's x, y (m); the joint positions
-/// start at index 6. The action is seven positions (rad) and seven velocities (rad/s). The constants are chosen, not derived.
+/// The action of a scripted agent that strikes the puck, so that the hashes cover contacts: in strokes of 40 control steps it moves the
+/// mallet from behind the puck through the puck's position. `observation` is in the robot's base frame and starts with the puck's x, y (m);
+/// the joint positions start at index 6. The action is seven positions (rad) and seven velocities (rad/s). The constants are chosen, not
+/// derived.
 #[must_use]
-pub fn strike(observation: &[f64], step: u32) -> [f64; 2 * JOINTS] {
+pub fn scripted_action(observation: &[f64], step: u32) -> [f64; 2 * JOINTS] {
     let q: [f64; JOINTS] = std::array::from_fn(|i| observation[6 + i]);
     let stroke_m = 0.35 * f64::from(step % STROKE_STEPS) / f64::from(STROKE_STEPS);
     let target = [

@@ -6,8 +6,8 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use faceoff_airhockey::{EVALUATION, TASKS};
 use faceoff_store::Store;
 use faceoff_types::{
-    ComputationTimeSummary, EvaluationId, EvaluationResult, RunId, Seed, ShardId, StageId,
-    StageRules, StageSettings, SubmissionId, TaskResult, TeamId, Tier, ViolationCounts, Zone,
+    ComputationTimeSummary, EvaluationId, EvaluationResult, IanaTimeZone, RunId, Seed, ShardId,
+    StageId, StageRules, StageSettings, SubmissionId, TaskResult, TeamId, Tier, ViolationCounts,
 };
 use jiff::{Timestamp, ToSpan, civil::date};
 use sqlx::{Connection, SqliteConnection};
@@ -179,7 +179,7 @@ fn board(criterion: &mut Criterion) {
             limits: Default::default(),
         };
         store
-            .configure_stage(rules, StageSettings::default(), Zone::UTC, now)
+            .configure_stage(rules, StageSettings::default(), IanaTimeZone::UTC, now)
             .await
             .unwrap();
         let stage = store.stages().await.unwrap().remove(0).id;

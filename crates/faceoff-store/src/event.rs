@@ -11,9 +11,9 @@ pub use parse::ParseEventError;
 pub use subject::Subject;
 
 use faceoff_types::{
-    DepartureKind, DivisionName, EvaluationId, InvitationId, ProposalId, Retention, RoundNumber,
-    RunId, ShardId, StageId, StageName, StageRules, StageSettings, SubmissionId, Task, TeamId,
-    TeamName, TokenId, TournamentRules, TournamentSettings, UserName, WebhookId, Zone,
+    DepartureKind, DivisionName, EvaluationId, IanaTimeZone, InvitationId, ProposalId, Retention,
+    RoundNumber, RunId, ShardId, StageId, StageName, StageRules, StageSettings, SubmissionId, Task,
+    TeamId, TeamName, TokenId, TournamentRules, TournamentSettings, UserName, WebhookId,
 };
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
@@ -332,7 +332,7 @@ pub enum Event {
         /// `None`: no end is set.
         closes_at: Option<Timestamp>,
         /// Time zone of the stage's dates.
-        zone: Zone,
+        zone: IanaTimeZone,
         /// Everything that scores depend on.
         rules: StageRules,
         /// Everything that scores do not depend on.
@@ -345,7 +345,7 @@ pub enum Event {
         /// `None`: no end is set.
         closes_at: Option<Timestamp>,
         /// Time zone of the stage's dates.
-        zone: Zone,
+        zone: IanaTimeZone,
         /// Everything that scores do not depend on.
         settings: StageSettings,
     },

@@ -135,7 +135,7 @@ pub use tables::{
     submissions::{Deletion, Submission, SubmissionState},
     teams::{Team, TeamProfile},
     terms::Terms,
-    tokens::{Maker, Token, TokenKind, TokenOwner, TokensOf},
+    tokens::{Creator, Token, TokenKind, TokenOwner, TokensOf},
     tournaments::Tournament,
     users::User,
     webhooks::{DisabledWebhook, Webhook, WebhookSecrets},

@@ -2,7 +2,7 @@
 
 use faceoff_airhockey::{DEFEND, EVALUATION, HIT, PREPARE};
 use faceoff_store::{Actor, RunPlan, Stage, StageChange, Store, StoreError};
-use faceoff_types::{Schedule, StageId, StageRules, StageSettings, Zone};
+use faceoff_types::{IanaTimeZone, Schedule, StageId, StageRules, StageSettings};
 use jiff::Timestamp;
 
 /// 3 tasks of 4 episodes in shards of 2 episodes. 3 agent faults are allowed.
@@ -66,7 +66,7 @@ pub async fn configure_stage(
         ..settings
     };
     store
-        .configure_stage(rules, settings, Zone::UTC, now)
+        .configure_stage(rules, settings, IanaTimeZone::UTC, now)
         .await
         .unwrap();
     store.stages().await.unwrap()[0].id

@@ -8,8 +8,8 @@ const MAX_DIMENSIONS: usize = 4;
 /// The actions that a competition takes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ActionSpace {
-    /// Do agents state the code of their layout, as `interpolation` in `ready`? If not, all have the first.
-    pub is_stated: bool,
+    /// Does each agent choose a layout, by sending its code as `interpolation` in `ready`? If not, all have the first.
+    pub agents_choose_layout: bool,
     /// At least one.
     pub layouts: Vec<ActionLayout>,
 }
@@ -17,7 +17,7 @@ pub struct ActionSpace {
 /// A layout of actions: its code, and the lengths of the nested arrays.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct ActionLayout {
-    /// The code by which agents state it: a number, or `null`.
+    /// The code by which agents choose it: a number, or `null`.
     code: Option<i64>,
     lengths: [usize; MAX_DIMENSIONS],
     dimensions: usize,
@@ -88,7 +88,11 @@ impl ActionSpace {
     #[must_use]
     pub fn only_layout(&self) -> Option<ActionLayout> {
         let first = || self.layouts.first().copied();
-        if self.is_stated { None } else { first() }
+        if self.agents_choose_layout {
+            None
+        } else {
+            first()
+        }
     }
 
     /// The codes of all layouts.
@@ -135,7 +139,7 @@ mod tests {
     #[test]
     fn layouts_are_found_by_code_and_by_text() {
         let stated = ActionSpace {
-            is_stated: true,
+            agents_choose_layout: true,
             layouts: vec![
                 ActionLayout::new(Some(1), &[2]),
                 ActionLayout::new(Some(-1), &[3, 2]),
@@ -153,7 +157,7 @@ mod tests {
             assert_eq!(stated.parse(unknown), None);
         }
         let single = ActionSpace {
-            is_stated: false,
+            agents_choose_layout: false,
             layouts: vec![ActionLayout::new(None, &[1])],
         };
         assert_eq!(single.only_layout().unwrap().shape(), [1]);

@@ -114,8 +114,8 @@ pub struct ProfileInfo {
     pub description: String,
     /// Its letter in charts, where colour alone must not carry the meaning.
     pub letter: char,
-    /// Do ablations play it?
-    pub is_ablated: bool,
+    /// Do ablations evaluate submissions in this profile?
+    pub is_in_ablations: bool,
 }
 
 impl Competition {
@@ -160,7 +160,7 @@ impl Competition {
         let layouts = self.actions.layouts.len();
         require(layouts > 0, "it has no layout of actions")?;
         require(
-            self.actions.is_stated || layouts == 1,
+            self.actions.agents_choose_layout || layouts == 1,
             "agents have to state one of several layouts",
         )?;
         let profiles = [self.ideal_profile, self.counting_profile];
@@ -310,7 +310,8 @@ impl Competition {
 
     /// The profiles that an ablation plays, in the order of lists. The ideal one is always among them.
     pub fn ablation_profiles(&self) -> impl Iterator<Item = Profile> + Clone + '_ {
-        let is_played = |info: &&ProfileInfo| info.is_ablated || info.profile == self.ideal_profile;
+        let is_played =
+            |info: &&ProfileInfo| info.is_in_ablations || info.profile == self.ideal_profile;
         self.profiles
             .iter()
             .filter(is_played)
@@ -506,13 +507,13 @@ mod tests {
                 title: "plain".to_owned(),
                 description: "No perturbations.".to_owned(),
                 letter: 'P',
-                is_ablated: true,
+                is_in_ablations: true,
             }],
             ideal_profile: PLAIN,
             counting_profile: PLAIN,
             magnitudes: Vec::new(),
             actions: ActionSpace {
-                is_stated: false,
+                agents_choose_layout: false,
                 layouts: Vec::new(),
             },
             recording: RecordingColumns::default(),

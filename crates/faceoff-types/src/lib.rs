@@ -49,6 +49,7 @@ mod stage_settings;
 mod task;
 mod task_weights;
 mod tier;
+mod time_zone;
 mod timing;
 mod tournament_format;
 mod tournament_rules;
@@ -59,7 +60,6 @@ mod validation_outcome;
 mod variation;
 mod violation;
 mod worker_name;
-mod zone;
 
 pub use action_space::{ActionLayout, ActionSpace};
 pub use agent_task::{AgentTask, Side};
@@ -108,6 +108,7 @@ pub use stage_settings::{CountingResult, Publication, StageSettings, UnknownSett
 pub use task::{CONTROL_STEP_S, EPISODE_STEPS, MAX_EPISODES_PER_TASK, Task, TaskMap};
 pub use task_weights::{InvalidWeights, TaskWeights};
 pub use tier::Tier;
+pub use time_zone::{IanaTimeZone, UnknownTimeZone};
 pub use timing::{RoundTrips, SlotTiming};
 pub use tournament_format::TournamentFormat;
 pub use tournament_rules::{
@@ -121,4 +122,3 @@ pub use validation_outcome::{ValidationOutcome, ValidationTiming, ViolatedLimit}
 pub use variation::{InvalidTierBounds, TierBounds, Variation};
 pub use violation::{ViolationCounts, ViolationName, Violations};
 pub use worker_name::{ParseWorkerNameError, WorkerName};
-pub use zone::{UnknownZone, Zone};

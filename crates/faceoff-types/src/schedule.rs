@@ -1,7 +1,7 @@
 //! Schedules: when the evaluation days of a stage start. A day starts with its *cutoff*, the moment at which each team's
 //! active submission is fixed.
 
-use crate::Zone;
+use crate::IanaTimeZone;
 use croner::{
     Cron,
     errors::CronError,
@@ -102,7 +102,7 @@ impl Schedule {
         match schedule.next(
             jiff::civil::date(2000, 1, 1),
             Timestamp::UNIX_EPOCH,
-            &Zone::UTC,
+            &IanaTimeZone::UTC,
         ) {
             Some(_) => Ok(schedule),
             None => Err(invalid("there is no such date".to_owned())),
@@ -124,7 +124,7 @@ impl Schedule {
         &self,
         mut from: Date,
         earliest: Timestamp,
-        zone: &Zone,
+        zone: &IanaTimeZone,
     ) -> Option<(Date, Timestamp)> {
         let horizon = from.checked_add(Span::new().days(HORIZON_DAYS)).ok()?;
         while from <= horizon {
@@ -143,7 +143,7 @@ impl Schedule {
         &self,
         from: Date,
         earliest: Timestamp,
-        zone: &Zone,
+        zone: &IanaTimeZone,
     ) -> Option<(Date, Timestamp)> {
         match &self.recurrence {
             Recurrence::Daily(time) => {
@@ -207,7 +207,7 @@ mod tests {
 
     /// The first `count` starts on or after the date `from`, as the local date and the instant.
     fn starts(schedule: &Schedule, zone: &str, from: Date, count: usize) -> Vec<String> {
-        let zone: Zone = zone.parse().unwrap();
+        let zone: IanaTimeZone = zone.parse().unwrap();
         let mut from = from;
         let next = || {
             let (date, at) = schedule.next(from, Timestamp::UNIX_EPOCH, &zone)?;
@@ -249,10 +249,10 @@ mod tests {
         );
         // On the first date, the first remaining time.
         let earliest = "2026-11-20T12:00:00Z".parse().unwrap();
-        let next = weekdays.next(date(2026, 11, 20), earliest, &Zone::UTC);
+        let next = weekdays.next(date(2026, 11, 20), earliest, &IanaTimeZone::UTC);
         assert_eq!(next.unwrap().1.to_string(), "2026-11-20T18:00:00Z");
         let daily = Schedule::daily("06:00".parse().unwrap());
-        let next = daily.next(date(2026, 11, 20), earliest, &Zone::UTC);
+        let next = daily.next(date(2026, 11, 20), earliest, &IanaTimeZone::UTC);
         assert_eq!(next.unwrap().1.to_string(), "2026-11-21T06:00:00Z");
         let leap = Schedule::cron("0 0 29 2 *").unwrap();
         assert_eq!(

@@ -2,9 +2,9 @@
 
 use crate::{
     AblationId, AnnouncementId, DeliveryId, DivisionName, EvaluationId, GameId, GameSeedLabel,
-    InvitationId, Profile, ProposalId, QuestionId, RegistrationId, Ruleset, RunId, SeedLabel,
-    ShardId, StageId, StageName, SubmissionId, Task, TeamId, TeamName, TokenId, TournamentId,
-    UserId, UserName, WebhookId, Zone,
+    IanaTimeZone, InvitationId, Profile, ProposalId, QuestionId, RegistrationId, Ruleset, RunId,
+    SeedLabel, ShardId, StageId, StageName, SubmissionId, Task, TeamId, TeamName, TokenId,
+    TournamentId, UserId, UserName, WebhookId,
 };
 
 /// Implements sqlx's traits for types with `Display` and `FromStr`, so that queries bind and return them as text.
@@ -63,5 +63,5 @@ sqlite_text!(
     UserId,
     UserName,
     WebhookId,
-    Zone,
+    IanaTimeZone,
 );

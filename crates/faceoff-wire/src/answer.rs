@@ -39,7 +39,7 @@ pub struct Ready {
 /// An agent fault, if the line is not a JSON object or not `ready`, has another protocol version, an unknown or no
 /// layout of actions where one must be stated, or a repeated key.
 pub fn parse_ready(line: &[u8], actions: &ActionSpace) -> Result<Ready, AgentFaultKind> {
-    let expected = if actions.is_stated {
+    let expected = if actions.agents_choose_layout {
         "ready with protocol 1 and an interpolation"
     } else {
         "ready with protocol 1"

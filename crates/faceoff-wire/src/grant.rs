@@ -1,5 +1,5 @@
-//! Grants: which of the server's files the holder of a lease may read and write. A *lease* is the right to run a job for a limited
-//! time.
+//! Grants: signed tickets, like presigned URLs, that name the server's files which a remote worker may read and write for one job. A
+//! *lease* is the right to run a job for a limited time.
 //!
 //! The server seals a grant with a secret key, so it can check grants without storing them, and they cannot be
 //! forged. On each use it also asks the queue whether the lease is still valid.
@@ -10,7 +10,8 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use uuid::Uuid;
 
-/// File access for one lease of a job.
+/// A grant: the file access of a worker, as long as it has one lease of one job. The server issues it with the job, and the worker sends
+/// it with each request for a file and with the result.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Grant {
     /// Id of the job in the queue.

@@ -85,7 +85,7 @@ impl Manifest {
         let Some(code) = self.interpolation else {
             return Ok(());
         };
-        if !actions.is_stated {
+        if !actions.agents_choose_layout {
             let problem = format!("is {code}: leave it out, the competition has none");
             return require(false, "interpolation", &problem);
         }
@@ -256,12 +256,12 @@ mod tests {
         let mut manifest = Manifest::parse(VALID_MANIFEST).unwrap();
         let layout = |code| ActionLayout::new(code, &[2]);
         let stated = ActionSpace {
-            is_stated: true,
+            agents_choose_layout: true,
             layouts: [Some(3), Some(-1), None].map(layout).into(),
         };
         assert_eq!(manifest.check_interpolation(&stated), Ok(()));
         let single = ActionSpace {
-            is_stated: false,
+            agents_choose_layout: false,
             layouts: vec![layout(None)],
         };
         let refused = |manifest: &Manifest, actions| {

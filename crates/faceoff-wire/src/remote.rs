@@ -175,8 +175,10 @@ pub enum JobEnd {
         /// The report of the job.
         report: Box<JobReport>,
     },
-    /// The worker shut down; the attempt does not count.
-    Shutdown,
+    /// The job was interrupted without a fault: the worker shut down, or its program is of another version than the server's.
+    /// The attempt does not count.
+    #[serde(rename = "shutdown")]
+    Interrupted,
     /// The disk was full; the attempt does not count.
     FullDisk,
     /// A platform fault.

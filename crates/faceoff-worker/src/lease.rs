@@ -124,7 +124,7 @@ fn keep_lease(
         server.wait(job_done, interval.min(PROGRESS_TICK), queue_version);
         if shutdown.is_cancelled() {
             progress.stop.cancel();
-            if let Err(error) = server.release(lease, ReleaseReason::Shutdown) {
+            if let Err(error) = server.release(lease, ReleaseReason::Interrupted) {
                 tracing::warn!(job = %lease.job_id, cause = format!("{error:#}"), "the job could not be released; its lease will expire");
             }
             return;

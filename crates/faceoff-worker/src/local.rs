@@ -401,7 +401,7 @@ impl JobServer for LocalServer {
         let (claim, now) = (claim(lease, &lease.slot), self.clock.now());
         Ok(self.runtime.block_on(async {
             match reason {
-                ReleaseReason::Shutdown => self.store.release(&claim, now).await,
+                ReleaseReason::Interrupted => self.store.release(&claim, now).await,
                 ReleaseReason::FullDisk => self.store.release_disk_full(&claim, now).await,
                 ReleaseReason::PlatformFault(summary) => {
                     self.store.release_failed(&claim, summary, now).await

@@ -70,11 +70,12 @@ pub(crate) enum LeaseStatus {
     Lost,
 }
 
-/// Why a job goes back to the queue.
+/// Why a job is released, that is, goes back to the queue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ReleaseReason<'a> {
-    /// The slot shuts down; the attempt does not count.
-    Shutdown,
+    /// The job was interrupted without a fault: the worker shuts down, or its program is of another version than the server's.
+    /// The attempt does not count.
+    Interrupted,
     /// The disk was full. The job is tried again when there is free space, and the attempt does not count.
     FullDisk,
     /// A platform fault, with a description for the team. After several attempts the job fails.

@@ -11,8 +11,8 @@ use faceoff_runner::{AgentEnvironment, Supervision, TimeLimits, bundle::BundleLi
 use faceoff_sandbox::{Isolation, Layer, Limits, Runtime};
 use faceoff_store::UploadQuota;
 use faceoff_types::{
-    CountingResult, DayDeadline, InvalidSchedule, Magnitudes, Profile, Publication, Schedule,
-    StageRules, StageSettings, Task, TaskWeights, TierBounds, Variation, Zone,
+    CountingResult, DayDeadline, IanaTimeZone, InvalidSchedule, Magnitudes, Profile, Publication,
+    Schedule, StageRules, StageSettings, Task, TaskWeights, TierBounds, Variation,
 };
 use jiff::civil::{Date, Time};
 use reqwest::header::HeaderName;
@@ -130,7 +130,7 @@ pub struct EvaluationConfig {
     /// Dates without a cutoff by `at` or `cron`.
     pub days_off: Vec<Date>,
     /// Time zone of `at` and `cron`, and of the dates of evaluation days.
-    pub zone: Zone,
+    pub zone: IanaTimeZone,
     /// Deadline of evaluation days.
     pub day_deadline: DayDeadline,
     /// Allowed agent faults; with more, an evaluation ends without a score.
@@ -162,7 +162,7 @@ impl Default for EvaluationConfig {
             at: None,
             cron: None,
             days_off: Vec::new(),
-            zone: Zone::UTC,
+            zone: IanaTimeZone::UTC,
             day_deadline: settings.day_deadline,
             max_faults: 10,
             ablation_episodes: settings.ablation_episodes,

@@ -70,7 +70,7 @@ fn remote_ablation_equals_local_ablation() {
     let [data_dir, local_data_dir] = ["data", "local"].map(|name| scratch.path().join(name));
     let server = Server::start(&data_dir, &local_config());
     let team = Team::create(&server, "Phoenix");
-    let submission = team.submit(&server, &bundle::reference("striker", scratch.path()));
+    let submission = team.submit(&server, &bundle::example_agent("striker", scratch.path()));
     assert_eq!(submission["state"], "valid", "{submission:#}");
     let submission = submission["id"].as_str().expect("it has an id");
     let pause = json!({ "reason": "Until the workers are connected" });

@@ -1,7 +1,7 @@
 //! Episodes from scripted answers: recordings, limits on steps, faults and divergence.
 
-use faceoff_airhockey::{Arena, recording_columns};
 use faceoff_airhockey::{DEFEND, HIT, PREPARE, TASKS};
+use faceoff_airhockey::{SimulationSetup, recording_columns};
 use faceoff_episode::{
     AnswerTiming, EpisodeStart, NullSink, Question, RecordError, RunningEpisode, StateColumns,
     StepRow, StepSink, World,
@@ -38,7 +38,8 @@ impl SinkLog {
         let mut state = State::default();
         world.record_state(&mut state);
         assert_eq!(state.0.len(), recording_columns().state.len());
-        self.lines.push(format!("{state:?} {:?}", world.limits()));
+        self.lines
+            .push(format!("{state:?} {:?}", world.constraint_values()));
     }
 }
 
@@ -73,14 +74,14 @@ const JOINT_VELOCITIES: Range<usize> = 13..20;
 /// Index of the episode within the evaluation; arbitrary.
 const EPISODE: u32 = 4;
 
-fn arena() -> Arena {
+fn simulation_setup() -> SimulationSetup {
     let seed = Seed::from_number(3); // arbitrary
-    Arena::new(AirHockeyProfile::Evaluation, seed, seed.model_mismatch())
+    SimulationSetup::new(AirHockeyProfile::Evaluation, seed, seed.model_mismatch())
 }
 
 fn begin<S: StepSink>(task: Task, sink: S) -> RunningEpisode<S> {
     RunningEpisode::begin(
-        &arena(),
+        &simulation_setup(),
         task,
         EPISODE,
         Some(Interpolation::Cubic.into()),
@@ -204,8 +205,8 @@ fn extreme_action(observation: &[f64]) -> Vec<f64> {
 
 fn begin_within<S: StepSink>(bounds: Bounds, sink: S) -> RunningEpisode<S> {
     let layout = Some(Interpolation::Trajectory.into());
-    let arena = arena().with_bounds(bounds);
-    RunningEpisode::begin(&arena, PREPARE, EPISODE, layout, sink).unwrap()
+    let setup = simulation_setup().with_bounds(bounds);
+    RunningEpisode::begin(&setup, PREPARE, EPISODE, layout, sink).unwrap()
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! Games from scripted answers: late answers, faults, forfeits and divergence.
 
 use faceoff_airhockey::{
-    Arena, Effect, FinishedGame, GameSink, GameStepRow, RallyEnding, RallyEntry, RallyRow,
-    RallyStart, Response, RunningGame, SideFault,
+    Effect, FinishedGame, GameSink, GameStepRow, RallyEnding, RallyEntry, RallyRow, RallyStart,
+    Response, RunningGame, SideFault, SimulationSetup,
 };
 use faceoff_episode::{AnswerTiming, RecordError};
 use faceoff_sim::{AirHockeyProfile, Bounds, Interpolation, RallyEnd};
@@ -18,9 +18,9 @@ const JOINT_VELOCITIES: Range<usize> = 13..20;
 /// Control steps of a game of full length, which ends earlier in these tests.
 const FULL_GAME_STEPS: u32 = 45_000;
 
-fn arena() -> Arena {
+fn simulation_setup() -> SimulationSetup {
     let seed = Seed::from_number(3); // arbitrary
-    Arena::new(AirHockeyProfile::Ideal, seed, seed.model_mismatch())
+    SimulationSetup::new(AirHockeyProfile::Ideal, seed, seed.model_mismatch())
 }
 
 /// Bounds on the simulated motion that the largest commands exceed.
@@ -106,16 +106,16 @@ fn ready(running: &RunningGame<SinkLog>, side: Side) -> RallyEntry {
 }
 
 fn play(steps: u32, limits: GameLimits, scripts: [Script; 2]) -> FinishedGame<SinkLog> {
-    play_in(&arena(), steps, limits, scripts)
+    play_in(&simulation_setup(), steps, limits, scripts)
 }
 
 fn play_in(
-    arena: &Arena,
+    setup: &SimulationSetup,
     steps: u32,
     limits: GameLimits,
     scripts: [Script; 2],
 ) -> FinishedGame<SinkLog> {
-    let mut running = RunningGame::begin(arena, steps, limits, SinkLog::default());
+    let mut running = RunningGame::begin(setup, steps, limits, SinkLog::default());
     let mut speeds = [[0.0; 7]; 2];
     while running.end().is_none() {
         running
@@ -305,7 +305,7 @@ fn failed_start_is_a_fault() {
         max_faults: 0,
         ..GameLimits::default()
     };
-    let mut running = RunningGame::begin(&arena(), 100, limits, SinkLog::default());
+    let mut running = RunningGame::begin(&simulation_setup(), 100, limits, SinkLog::default());
     let start_failed = RallyEntry::StartFailed {
         startup_s: 120.0,
         fault: side_fault(),
@@ -331,8 +331,8 @@ fn divergence_is_the_fault_of_its_side() {
     fn diverge(_: u32, _: u32) -> ScriptedStep {
         ScriptedStep::Diverge
     }
-    let narrow_arena = arena().with_bounds(NARROW_BOUNDS);
-    let game = play_in(&narrow_arena, 1000, GameLimits::default(), [hold, diverge]);
+    let narrow_setup = simulation_setup().with_bounds(NARROW_BOUNDS);
+    let game = play_in(&narrow_setup, 1000, GameLimits::default(), [hold, diverge]);
     let [holding_side, faulty_side] = &game.outcome.sides;
     assert_eq!(holding_side.faults, []);
     assert!(!faulty_side.faults.is_empty());

@@ -78,7 +78,7 @@ impl EpisodesQuery {
                 "" => None,
                 "any" => Some(ViolatedLimit::Any),
                 "late" => Some(ViolatedLimit::Late),
-                group => parse_field(group, "violated")?.map(ViolatedLimit::One),
+                name => parse_field(name, "violated")?.map(ViolatedLimit::One),
             },
             end: parse_field(&self.end, "end")?,
         })
@@ -90,7 +90,10 @@ impl EpisodeFilter {
     pub fn matches(self, episode: &EpisodeLine) -> bool {
         let violates = |limit| match limit {
             ViolatedLimit::Any => !episode.broken.is_empty(),
-            ViolatedLimit::One(group) => episode.broken.iter().any(|broken| broken.group == group),
+            ViolatedLimit::One(name) => episode
+                .broken
+                .iter()
+                .any(|violation| violation.group == name),
             ViolatedLimit::Late => episode.late > 0,
         };
         self.task.is_none_or(|task| task == episode.task)

@@ -10,9 +10,9 @@ pub use options::read_perturbations;
 use super::double_option::{OrNull, deserialize_some};
 use crate::objects_only;
 use faceoff_types::{
-    CountingResult, DayDeadline, InvalidStageRules, Magnitudes, Profile, Publication, Retention,
-    Ruleset, Runtimes, Schedule, StageLimits, StageRules, StageSettings, StageUploadLimits, Task,
-    TaskWeights, TierBounds, Zone,
+    CountingResult, DayDeadline, IanaTimeZone, InvalidStageRules, Magnitudes, Profile, Publication,
+    Retention, Ruleset, Runtimes, Schedule, StageLimits, StageRules, StageSettings,
+    StageUploadLimits, Task, TaskWeights, TierBounds,
 };
 use jiff::Timestamp;
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
@@ -51,7 +51,7 @@ pub struct StagePatch {
         )
     )]
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub zone: Option<Zone>,
+    pub zone: Option<IanaTimeZone>,
     /// Perturbation profile of the simulator.
     #[cfg_attr(feature = "clap", arg(long, help = "Perturbation profile"))]
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -11,7 +11,7 @@ pub struct ArchiveView {
     pub made_at: Timestamp,
     /// When this server imported it; null inside an archive.
     pub imported_at: Option<Timestamp>,
-    /// `public` or `organiser`.
+    /// `public` leaves out what only organisers may see; `organiser` is complete.
     #[schema(example = "public")]
     pub edition: String,
     /// The program and version that made the archive.

@@ -2,7 +2,7 @@
 //! evaluations of this cutoff.
 
 use crate::views::{evaluation::EvaluationView, exclusion::ExcludedTeam, team::TeamView};
-use faceoff_types::{StageId, StageName, Zone, deprecated_names};
+use faceoff_types::{IanaTimeZone, StageId, StageName, deprecated_names};
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -38,7 +38,7 @@ pub struct NextCutoff {
     /// The scheduled time; null if an organiser starts the day.
     pub at: Option<Timestamp>,
     /// Time zone of the stage.
-    pub zone: Zone,
+    pub zone: IanaTimeZone,
 }
 
 impl fmt::Display for NextCutoff {

@@ -39,7 +39,7 @@ pub struct EvaluationView {
     /// runs on other episodes than the day's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub extra_evaluation: Option<String>,
-    /// Does it repeat an evaluation of the day on an organiser's order, given after the release, when the day's seed was public?
+    /// Does it repeat an evaluation of the day at an organiser's request, made after the release, when the day's seed was public?
     /// Absent if not.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub rerun_after_release: bool,

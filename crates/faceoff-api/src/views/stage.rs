@@ -3,7 +3,7 @@
 
 use crate::views::{capacity::DayLoad, day::NextCutoff, ruling::RulingView, sign_off::SignOffView};
 use faceoff_types::{
-    Retention, StageId, StageName, StageRules, StageSettings, Zone, deprecated_names,
+    IanaTimeZone, Retention, StageId, StageName, StageRules, StageSettings, deprecated_names,
 };
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
@@ -24,7 +24,7 @@ pub struct StageView {
     /// When the stage closes: no further day starts; null: no end.
     pub closes_at: Option<Timestamp>,
     /// Time zone of its days and its schedule.
-    pub zone: Zone,
+    pub zone: IanaTimeZone,
     /// The stage's next cutoff; null if there is none.
     pub next_cutoff: Option<NextCutoff>,
     /// If its boards are frozen: since when, and why; absent otherwise.

@@ -1,7 +1,7 @@
 //! The conditions of a game: the same to play under, and to verify the recording with.
 
 use crate::simulator;
-use faceoff_airhockey::{Arena, arena};
+use faceoff_airhockey::{SimulationSetup, simulation_setup};
 use faceoff_episode::{Conditions, InvalidConditions};
 use faceoff_wire::{dataset::SimulatorId, game::GameSpec};
 
@@ -9,8 +9,8 @@ use faceoff_wire::{dataset::SimulatorId, game::GameSpec};
 ///
 /// # Errors
 /// If the simulator has no such ruleset, profile or magnitudes.
-pub fn game_arena(spec: &GameSpec) -> Result<Arena, InvalidConditions> {
-    arena(&Conditions {
+pub fn game_simulation_setup(spec: &GameSpec) -> Result<SimulationSetup, InvalidConditions> {
+    simulation_setup(&Conditions {
         ruleset: spec.ruleset,
         profile: spec.profile,
         perturbations: &spec.perturbations,

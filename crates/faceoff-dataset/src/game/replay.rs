@@ -2,7 +2,7 @@
 //! compared with the recorded one.
 
 use super::{
-    conditions::game_arena,
+    conditions::game_simulation_setup,
     files::{MOTION_FILE, RALLIES_FILE, entries_file, steps_file},
     recorded_inputs::{RecordedEntry, RecordedResponse, RowLocation},
     recording::GameRecording,
@@ -41,8 +41,8 @@ struct RecordedRally {
 impl GameReplay {
     pub fn open(recording: &GameRecording) -> Result<Self, DatasetError> {
         let spec = &recording.manifest().spec;
-        let arena =
-            game_arena(spec).map_err(|unknown| DatasetError::Foreign(unknown.to_string()))?;
+        let setup = game_simulation_setup(spec)
+            .map_err(|unknown| DatasetError::Foreign(unknown.to_string()))?;
         let rows = GameRows::new();
         let entries =
             |side: Side| recording.table(entries_file(side), rows.entries[side.index()].schema());
@@ -53,7 +53,7 @@ impl GameReplay {
             entries: [entries(Side::First)?, entries(Side::Second)?],
             motion: recording.table(MOTION_FILE, rows.motion.schema())?,
             steps: [steps(Side::First)?, steps(Side::Second)?],
-            game: RunningGame::begin(&arena, spec.steps, spec.limits.clone(), rows),
+            game: RunningGame::begin(&setup, spec.steps, spec.limits.clone(), rows),
         })
     }
 

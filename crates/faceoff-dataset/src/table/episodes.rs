@@ -125,7 +125,9 @@ impl EpisodeRows {
     pub fn begin(&mut self, start: &EpisodeStart<'_>) {
         let mut initial = StateValues::default();
         start.world.record_state(&mut initial);
-        let stated = start.layout.filter(|_| self.competition.actions.is_stated);
+        let stated = start
+            .layout
+            .filter(|_| self.competition.actions.agents_choose_layout);
         self.started = Some(StartedEpisode {
             seed: start.seed.to_string(),
             interpolation: stated.map(|layout| layout.to_string()),

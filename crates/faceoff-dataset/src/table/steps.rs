@@ -115,7 +115,7 @@ impl StepRows {
             .append_option(row.timing.cpu_time_s.map(nanoseconds));
         let state_and_constraints = &mut self.state_and_constraints;
         row.world.record_state(state_and_constraints);
-        state_and_constraints.put(row.world.limits());
+        state_and_constraints.put(row.world.constraint_values());
         state_and_constraints.end_row();
     }
 

@@ -67,7 +67,9 @@ impl StepSink for ReplayRows {
         self.steps.push(row);
         self.episodes.step(row);
         self.measured.timings.push(row.timing);
-        self.measured.limits.extend_from_slice(row.world.limits());
+        self.measured
+            .constraint_values
+            .extend_from_slice(row.world.constraint_values());
     }
 
     fn end(&mut self, outcome: &EpisodeOutcome, host_noise_reruns: u32) -> Result<(), RecordError> {

@@ -6,7 +6,7 @@ use crate::{
 };
 use arrow_array::{Array, RecordBatch, cast::AsArray, types::Float64Type};
 use faceoff_airhockey::EVALUATION;
-use faceoff_airhockey::{Arena, RallyEntry, Response, RunningGame, SideFault};
+use faceoff_airhockey::{RallyEntry, Response, RunningGame, SideFault, SimulationSetup};
 use faceoff_dataset::{
     DatasetError,
     game::{GAME_FILE, GameRecorder, GameRecording, RecordedGame, side_file, verify_game},
@@ -45,13 +45,13 @@ fn spec() -> GameSpec {
 /// another interpolation after a restart.
 fn record(out: &Path) {
     let spec = spec();
-    let arena = Arena::new(
+    let setup = SimulationSetup::new(
         spec.profile.try_into().unwrap(),
         spec.seed,
         spec.mismatch_seed,
     );
     let recorder = GameRecorder::create(&out.join("tables")).unwrap();
-    let mut game = RunningGame::begin(&arena, spec.steps, spec.limits.clone(), recorder);
+    let mut game = RunningGame::begin(&setup, spec.steps, spec.limits.clone(), recorder);
     let fault = |detail: &str| SideFault {
         kind: AgentFaultKind::NotJson {
             detail: detail.to_owned(),

@@ -63,7 +63,7 @@ impl World for PointMass {
         columns.put(&self.position_m);
     }
 
-    fn limits(&self) -> &[f64] {
+    fn constraint_values(&self) -> &[f64] {
         &[]
     }
 

@@ -4,9 +4,9 @@ use crate::{
     html::texts,
     site::{ADMIN, Answer, Site, TestTeam, result},
 };
-use faceoff_airhockey::Arena;
 use faceoff_airhockey::Interpolation;
 use faceoff_airhockey::PREPARE;
+use faceoff_airhockey::SimulationSetup;
 use faceoff_episode::{AnswerTiming, RunningEpisode, StepSink};
 use faceoff_replay::{Clip, ClipRecorder, join_packs};
 use faceoff_types::{AgentFaultKind, Phase, Seed};
@@ -35,7 +35,7 @@ struct RecordedDay {
 /// Records the clips of a short evaluation. Returns the file that joins them.
 pub(crate) fn record_clips(folder: &std::path::Path) -> PathBuf {
     let seed = Seed::from_number(3);
-    let arena = Arena::new(
+    let setup = SimulationSetup::new(
         faceoff_airhockey::EVALUATION.try_into().unwrap(),
         seed,
         seed.model_mismatch(),
@@ -50,7 +50,7 @@ pub(crate) fn record_clips(folder: &std::path::Path) -> PathBuf {
     for episode in 0..EPISODES {
         let layout = Some(Interpolation::Cubic.into());
         let mut running =
-            RunningEpisode::begin(&arena, PREPARE, episode, layout, &mut clips).unwrap();
+            RunningEpisode::begin(&setup, PREPARE, episode, layout, &mut clips).unwrap();
         // Entries 6 to 12 of an observation are the joint positions.
         let joint_positions = running.question().unwrap().observation[6..13].to_vec();
         let outcome = loop {

@@ -10,7 +10,7 @@ use faceoff_types::{Competition, Task};
 use std::cmp::Ordering;
 
 /// Head of a sortable column.
-pub(super) struct ColumnHead {
+pub(super) struct SortableColumn {
     pub(super) title: String,
     /// Unit of the column; empty without one.
     pub(super) unit: &'static str,
@@ -21,7 +21,7 @@ pub(super) struct ColumnHead {
     pub(super) direction: Option<&'static str>,
 }
 
-impl ColumnHead {
+impl SortableColumn {
     pub(super) fn symbol(&self) -> &'static str {
         match self.direction {
             Some("ascending") => "▴",
@@ -53,10 +53,10 @@ fn columns(
     columns
 }
 
-/// The sort of a board, with the heads of its columns.
+/// The sort of a board, with its sortable columns.
 pub(super) struct Sort {
     key: BoardSort,
-    pub(super) heads: Vec<ColumnHead>,
+    pub(super) columns: Vec<SortableColumn>,
 }
 
 impl Sort {
@@ -80,14 +80,14 @@ impl Sort {
                 format!("this board cannot be sorted by {:?}", key.column.as_str()),
             ));
         }
-        let head = |(column, title, unit, class): (BoardColumn, &str, _, _)| {
+        let sortable = |(column, title, unit, class): (BoardColumn, &str, _, _)| {
             let is_sorted = key.column == column;
             let is_ascending = is_ascending_by_default(column) != key.is_reversed;
             let sort = BoardSort {
                 column,
                 is_reversed: is_sorted && !key.is_reversed,
             };
-            ColumnHead {
+            SortableColumn {
                 title: title.to_owned(),
                 unit,
                 class,
@@ -101,7 +101,7 @@ impl Sort {
         };
         Ok(Self {
             key,
-            heads: columns.into_iter().map(head).collect(),
+            columns: columns.into_iter().map(sortable).collect(),
         })
     }
 

@@ -40,7 +40,7 @@ impl Page {
     }
 }
 
-async fn page_with(
+async fn render_page(
     app: &App,
     user: &PageOrganiser,
     notice: Notice<'_>,
@@ -69,7 +69,7 @@ pub(super) async fn page(
     State(app): State<App>,
     Query(notice): Query<DoneQuery>,
 ) -> Result<Response, PageProblem> {
-    page_with(&app, &user, Notice::Done(&notice), None).await
+    render_page(&app, &user, Notice::Done(&notice), None).await
 }
 
 pub(super) async fn create(
@@ -85,6 +85,6 @@ pub(super) async fn create(
     };
     match created {
         Ok(_) => Ok(redirect_done("/organiser/stages", "stage-made")),
-        Err(problem) => page_with(&app, &user, Notice::Refused(&problem), Some(form)).await,
+        Err(problem) => render_page(&app, &user, Notice::Refused(&problem), Some(form)).await,
     }
 }

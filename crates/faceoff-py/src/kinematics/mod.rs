@@ -31,7 +31,7 @@ const CONSTRAINTS: usize = 5 + 2 + 2 * JOINTS + 2 * JOINTS;
 #[pyfunction]
 pub fn arm_forward(py: Python<'_>, q: Input<'_>, mut ee: Output<'_>) -> PyResult<()> {
     map_rows(py, &q, &mut ee, |q| {
-        kinematics_at(q).end_effector.origin.lane(0)
+        kinematics_at(q).end_effector.origin.to_array()
     })
 }
 
@@ -47,7 +47,7 @@ pub fn arm_heights(py: Python<'_>, q: Input<'_>, mut heights: Output<'_>) -> PyR
 #[pyfunction]
 pub fn arm_jacobian(py: Python<'_>, q: Input<'_>, mut jacobians: Output<'_>) -> PyResult<()> {
     map_rows(py, &q, &mut jacobians, |q| -> [f64; 3 * JOINTS] {
-        let columns = jacobian(&kinematics_at(q)).map(|column| column.lane(0));
+        let columns = jacobian(&kinematics_at(q)).map(|column| column.to_array());
         from_fn(|index| columns[index % JOINTS][index / JOINTS])
     })
 }
@@ -71,7 +71,7 @@ pub fn arm_frames(
             let kinematics = kinematics_at(q);
             let frames = kinematics.links.iter().chain([&kinematics.end_effector]);
             for (i, frame) in frames.enumerate() {
-                origins[3 * i..][..3].copy_from_slice(&frame.origin.lane(0));
+                origins[3 * i..][..3].copy_from_slice(&frame.origin.to_array());
                 rotations[9 * i..][..9].copy_from_slice(&frame.rotation(0));
             }
         }
@@ -201,7 +201,7 @@ fn is_solution(arm: &Arm, q: &[f64; JOINTS], point: Vec3<f64>) -> bool {
 
 fn constraints(q: &[f64; JOINTS], dq: &[f64; JOINTS]) -> [f64; CONSTRAINTS] {
     let kinematics = kinematics_at(q);
-    let [x, y, z] = kinematics.end_effector.origin.lane(0);
+    let [x, y, z] = kinematics.end_effector.origin.to_array();
     let low = EE_DESIRED_HEIGHT_M - HEIGHT_TOLERANCE_M;
     let high = EE_DESIRED_HEIGHT_M + HEIGHT_TOLERANCE_M;
     let mut values = [0.0; CONSTRAINTS];

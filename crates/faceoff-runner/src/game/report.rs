@@ -12,7 +12,9 @@ use crate::{
     host_interference::{InterferenceMonitor, KernelCounters},
 };
 use faceoff_airhockey::{FinishedGame, GameSink, GameStepRow, RallyRow, RallyStart, RunningGame};
-use faceoff_dataset::game::{GameArchives, GameRecorder, RecordedGame, game_arena, remove_game};
+use faceoff_dataset::game::{
+    GameArchives, GameRecorder, RecordedGame, game_simulation_setup, remove_game,
+};
 use faceoff_episode::RecordError;
 use faceoff_sandbox::affinity::AffinityGuard;
 use faceoff_types::{AgentFault, Side};
@@ -138,7 +140,7 @@ pub fn play_game<S: GameSink>(
         Calibration::start(&first.agent_cpus)?,
         Calibration::start(&second.agent_cpus)?,
     ];
-    let arena = game_arena(spec)?;
+    let setup = game_simulation_setup(spec)?;
     let mut sides = Side::BOTH.map(|side| {
         let index = side.index();
         let restart_s = spec.limits.restart_s;
@@ -154,7 +156,7 @@ pub fn play_game<S: GameSink>(
         sink,
         observer: &mut *observer,
     };
-    let mut game = RunningGame::begin(&arena, spec.steps, spec.limits.clone(), observed);
+    let mut game = RunningGame::begin(&setup, spec.steps, spec.limits.clone(), observed);
     // Without a sandbox no CPU time is counted, so freezing is not needed.
     let after_answer =
         if AgentEnvironment::share_cpus(envs) && envs.iter().all(|env| env.has_cpu_accounting()) {

@@ -1,4 +1,4 @@
-//! Credentials (tokens, invitations, webhooks) that ended with the rights of their maker.
+//! Credentials (tokens, invitations, webhooks) that ended with the rights of their creator.
 
 use super::{invitation, token, user, webhook};
 use faceoff_api::views::credentials::EndedCredentialsView;

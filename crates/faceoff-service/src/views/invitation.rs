@@ -27,7 +27,7 @@ pub fn view(invitation: Invitation, now: Timestamp) -> InvitationView {
         team,
         person,
         note: invitation.note,
-        made_by: invitation.maker.user,
+        made_by: invitation.creator.user,
         created_at: invitation.created_at,
         expires_at: invitation.expires_at,
         state: state.into(),

@@ -18,7 +18,7 @@ pub fn view(token: Token) -> TokenView {
         },
         team,
         person,
-        made_by: token.maker.user,
+        made_by: token.creator.user,
         created_at: token.created_at,
         expires_at: token.expires_at,
         last_used_at: token.last_used_at,

@@ -32,7 +32,10 @@ fn main() {
     let filter = std::env::args().nth(1).filter(|arg| !arg.starts_with("--"));
     let is_wanted = |name: &str| filter.as_ref().is_none_or(|filter| name.contains(filter));
     println!("control steps/s (physics steps/s) of one core; speed-up over one by one");
-    for (profile, factors) in [("ideal", Factors::NONE), ("evaluation", Factors::ALL)] {
+    for (profile, factors) in [
+        ("ideal", Factors::NONE),
+        ("evaluation", Factors::EVALUATION),
+    ] {
         for task in AirHockeyTask::ALL {
             let name = format!("held/{task}/{profile}");
             if is_wanted(&name) {

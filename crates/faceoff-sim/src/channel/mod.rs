@@ -14,7 +14,8 @@ use faceoff_types::Seed;
 use latency::Latency;
 use observation::{OBSERVATION_WITH_OPPONENT_LEN, observe, wrap};
 
-/// The channel of one agent and its robot, for one episode, or one rally of a game.
+/// The communication channel between one agent and its robot, for one episode, or one rally of a game. It adds noise to the
+/// observations and delays the commands, as a Gymnasium wrapper would.
 #[derive(Debug, Clone)]
 pub struct AgentChannel {
     robot: usize,

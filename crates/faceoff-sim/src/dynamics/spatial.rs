@@ -54,10 +54,18 @@ impl<T: Lanes> Vec3<T> {
         Self::new(self.x * s, self.y * s, self.z * s)
     }
 
-    /// The vector of one arm.
+    /// The vector of the arm in lane `i`.
     #[inline(always)]
     pub fn lane(self, i: usize) -> [f64; 3] {
         [self.x.lane(i), self.y.lane(i), self.z.lane(i)]
+    }
+}
+
+impl Vec3<f64> {
+    /// x, y and z.
+    #[inline(always)]
+    pub const fn to_array(self) -> [f64; 3] {
+        [self.x, self.y, self.z]
     }
 }
 

@@ -74,7 +74,7 @@ impl ConstraintValues {
             values.joint_pos = values.joint_pos.max(position);
             values.joint_vel = values.joint_vel.max(velocity);
         }
-        let [x, y, z] = kinematics.end_effector.origin.lane(0);
+        let [x, y, z] = kinematics.end_effector.origin.to_array();
         let radius = TOOL.cylinder_radius_m;
         // Least x of the end effector, so that the mallet stays on the table.
         let near_edge_x = TABLE.base_x_m - (TABLE.half_length_m() - radius);

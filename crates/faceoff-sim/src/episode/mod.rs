@@ -179,7 +179,7 @@ impl Episode {
     #[must_use]
     pub fn state(&self) -> EpisodeState {
         let world = &self.world;
-        let ee = |robot: usize| world.kinematics(robot).end_effector.origin.lane(0);
+        let ee = |robot: usize| world.kinematics(robot).end_effector.origin.to_array();
         let has_opponent = self.opponent.is_some();
         EpisodeState {
             puck: world.puck().state(),

@@ -86,9 +86,9 @@ fn side_view(picture: &mut Picture) {
 fn arm(picture: &mut Picture) {
     let to_pixels = |[x, _, z]: [f64; 3]| pixels(SIDE_ORIGIN, [x, z]);
     let kinematics = Kinematics::new(&with_zero_universal(&INITIAL_Q));
-    let ee = kinematics.end_effector.origin.lane(0);
+    let ee = kinematics.end_effector.origin.to_array();
     let mut points = vec![[0.0; 3]];
-    points.extend(kinematics.links.map(|link| link.origin.lane(0)));
+    points.extend(kinematics.links.map(|link| link.origin.to_array()));
     points.push(ee);
     for (i, ends) in points.windows(2).enumerate() {
         let width = if i == JOINTS { 4 } else { 14 };
@@ -187,7 +187,7 @@ fn top_view(picture: &mut Picture) {
     let start = Kinematics::new(&with_zero_universal(&INITIAL_Q))
         .end_effector
         .origin
-        .lane(0);
+        .to_array();
     let mallet = pixels(TOP_ORIGIN, [start[0], start[1]]);
     picture.disc(mallet, radius * SCALE, "fill=\"#b23a48\"");
     picture.label([mallet[0] - 16.0, mallet[1] - 24.0], "mallet");

@@ -34,7 +34,7 @@ impl GameState {
             q: [0, 1].map(|robot| world.joints(robot)),
             dq: [0, 1].map(|robot| world.joint_velocities(robot)),
             universal: [0, 1].map(|robot| world.universal(robot)),
-            ee: kinematics.map(|robot| robot.end_effector.origin.lane(0)),
+            ee: kinematics.map(|robot| robot.end_effector.origin.to_array()),
         };
         (state, constraints)
     }

@@ -17,14 +17,14 @@ pub enum Factor {
     Disturbance,
     /// The puck's pose freezes for some steps.
     TrackingLoss,
-    /// Delays and table of the real laboratory. Not in [`Factor::ALL`], since only the profile
+    /// Delays and table of the real laboratory. Not in [`Factor::EVALUATION`], since only the profile
     /// `delay` uses it.
     Delay,
 }
 
 impl Factor {
-    /// All factors of the `evaluation` profile.
-    pub const ALL: [Self; 4] = [
+    /// The factors of the `evaluation` profile.
+    pub const EVALUATION: [Self; 4] = [
         Self::ModelMismatch,
         Self::ObservationNoise,
         Self::Disturbance,
@@ -57,8 +57,8 @@ pub struct Factors(u8);
 impl Factors {
     /// No factor: the simulator that the teams have.
     pub const NONE: Self = Self(0);
-    /// All four factors of the `evaluation` profile.
-    pub const ALL: Self = Self(0b1111);
+    /// The four factors of the `evaluation` profile; not [`Factor::Delay`].
+    pub const EVALUATION: Self = Self(0b1111);
 
     #[must_use]
     pub const fn only(factor: Factor) -> Self {
@@ -136,7 +136,7 @@ impl AirHockeyProfile {
             Self::Disturbance => Factors::only(Factor::Disturbance),
             Self::TrackingLoss => Factors::only(Factor::TrackingLoss),
             Self::Delay => Factors::only(Factor::Delay),
-            Self::Evaluation => Factors::ALL,
+            Self::Evaluation => Factors::EVALUATION,
         }
     }
 }
@@ -182,7 +182,7 @@ mod tests {
             assert_eq!(serde_json::to_string(&profile).unwrap(), json);
         }
         assert!("easy".parse::<AirHockeyProfile>().is_err());
-        for factor in Factor::ALL {
+        for factor in Factor::EVALUATION {
             assert!(AirHockeyProfile::Evaluation.factors().contains(factor));
             let single: AirHockeyProfile = factor.as_str().parse().unwrap();
             assert_eq!(single.factors(), Factors::only(factor));

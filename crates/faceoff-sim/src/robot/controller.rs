@@ -16,9 +16,9 @@ pub(crate) const LIMITER_GAIN: f64 = 20.0;
 pub(crate) const FILTER_NEW: f64 = 0.274;
 const FILTER_OLD: f64 = 0.726;
 
-/// Keeps the commands of an arm within its position and velocity limits.
+/// Limits the setpoints (desired positions and velocities) of an arm to its position and velocity limits.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Limiter<T = f64> {
+pub struct SetpointLimiter<T = f64> {
     /// The previously commanded position, rad.
     commanded: [T; JOINTS],
 }
@@ -30,7 +30,7 @@ pub struct LimitedSetpoint<T> {
     velocity: [T; JOINTS],
 }
 
-impl<T: Lanes> Limiter<T> {
+impl<T: Lanes> SetpointLimiter<T> {
     /// Starts at the joints' initial position.
     pub fn new(q: [T; JOINTS]) -> Self {
         Self { commanded: q }
@@ -38,15 +38,15 @@ impl<T: Lanes> Limiter<T> {
 
     /// Collects the limiters of several arms.
     #[inline(always)]
-    pub fn gather<'a>(limiter: impl Fn(usize) -> &'a Limiter) -> Self {
+    pub fn gather<'a>(limiter: impl Fn(usize) -> &'a SetpointLimiter) -> Self {
         Self {
             commanded: gather(|lane| &limiter(lane).commanded),
         }
     }
 
     /// The limiter of one arm.
-    pub fn lane(&self, lane: usize) -> Limiter {
-        Limiter {
+    pub fn lane(&self, lane: usize) -> SetpointLimiter {
+        SetpointLimiter {
             commanded: row(&self.commanded, lane),
         }
     }

@@ -6,7 +6,7 @@ use crate::{
     dynamics::arm::Kinematics,
     model::{DOFS, JOINTS, SUBSTEP_S, SUBSTEPS},
     robot::{
-        controller::Limiter,
+        controller::SetpointLimiter,
         inverse_kinematics::with_zero_universal,
         plant::Plant,
         trajectory::{Setpoint, Trajectory, interpolate},
@@ -27,7 +27,7 @@ pub struct Arm {
     pub(super) torque: [f64; JOINTS],
     /// Desired motion in the current control step.
     pub(super) trajectory: Trajectory,
-    pub(super) limiter: Limiter,
+    pub(super) limiter: SetpointLimiter,
     pub(super) universal: UniversalJoint,
     /// Dry friction and stops.
     pub(super) constraints: JointConstraints,
@@ -53,10 +53,10 @@ impl Arm {
             dq_filtered: [0.0; JOINTS],
             torque: [0.0; JOINTS],
             trajectory: [Setpoint::at_rest(*joints); SUBSTEPS],
-            limiter: Limiter::new(*joints),
+            limiter: SetpointLimiter::new(*joints),
             universal: UniversalJoint::at_rest(),
             constraints: JointConstraints::new(plant),
-            ee_before: ee.origin.lane(0),
+            ee_before: ee.origin.to_array(),
             coasted_steps: 0,
         }
     }

@@ -8,7 +8,7 @@ use crate::{
     },
     model::{DOFS, JOINTS},
     robot::{
-        controller::Limiter,
+        controller::SetpointLimiter,
         plant::{Plant, PlantLanes},
         universal_joint::UniversalJoint,
     },
@@ -20,7 +20,7 @@ pub struct ArmLanes<T: Lanes> {
     pub motion: MotionLanes<T>,
     /// Torques of the drives, N m.
     pub torque: [T; JOINTS],
-    pub limiter: Limiter<T>,
+    pub limiter: SetpointLimiter<T>,
     pub universal: UniversalJoint<T>,
     pub friction: FrictionLanes<T>,
     /// Positions of the end effectors before the substep, m, each in its robot's base frame.
@@ -51,7 +51,7 @@ impl<T: Lanes> ArmLanes<T> {
                 dq_filtered: gather(|lane| &arm(lane).dq_filtered),
             },
             torque: gather(|lane| &arm(lane).torque),
-            limiter: Limiter::gather(|lane| &arm(lane).limiter),
+            limiter: SetpointLimiter::gather(|lane| &arm(lane).limiter),
             universal: UniversalJoint::gather(|lane| &arm(lane).universal),
             friction: FrictionLanes::gather(|lane| &arm(lane).constraints),
             ee_before: {

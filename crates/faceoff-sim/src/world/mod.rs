@@ -217,7 +217,7 @@ impl World {
         }
         let side = side(robot);
         MalletState {
-            position: table_from_robot(robot, centre.lane(0)),
+            position: table_from_robot(robot, centre.to_array()),
             velocity: [side * vx, side * vy],
         }
     }

@@ -3,7 +3,7 @@
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
     Command, Episode, Factors, Game, GameSetup, Interpolation, PerturbationSettings, Plant,
-    golden::strike, model::INITIAL_Q,
+    golden::scripted_action, model::INITIAL_Q,
 };
 use faceoff_types::Seed;
 
@@ -16,7 +16,7 @@ fn control_steps_allocate_nothing() {
         let mut episode = Episode::new(
             task,
             Interpolation::Cubic,
-            Factors::ALL,
+            Factors::EVALUATION,
             &settings,
             &plant,
             seed.episode(task, 0),
@@ -25,7 +25,7 @@ fn control_steps_allocate_nothing() {
         let mut is_puck_moved = false;
         let allocations_of_step = |episode: &mut Episode, is_puck_moved: &mut bool| {
             allocation_counter::measure(|| {
-                let action = strike(episode.observation(), episode.steps());
+                let action = scripted_action(episode.observation(), episode.steps());
                 episode.step(&action);
                 *is_puck_moved |= episode.world().puck().velocity != before.velocity;
             })
@@ -44,7 +44,7 @@ fn control_steps_allocate_nothing() {
 fn game_allocates_only_at_the_start_of_a_rally() {
     let mut game = Game::new(GameSetup {
         interpolation: [Interpolation::Cubic; 2],
-        factors: Factors::ALL,
+        factors: Factors::EVALUATION,
         settings: PerturbationSettings::default(),
         plant: Plant::nominal(),
         seed: Seed::from_number(1),

@@ -43,7 +43,7 @@ fn motions_match_recordings() {
             }
             let row = |key: &str| flat(&case[key][step + 1]);
             let kinematics = world.kinematics(0);
-            let ee = kinematics.end_effector.origin.lane(0);
+            let ee = kinematics.end_effector.origin.to_array();
             d.q = d.q.max(max_difference(&row("q"), &world.joints(0)));
             d.dq =
                 d.dq.max(max_difference(&row("dq"), &world.joint_velocities(0)));

@@ -2,7 +2,8 @@
 
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
-    Batch, BatchSetup, Episode, Factors, Interpolation, PerturbationSettings, Plant, golden::strike,
+    Batch, BatchSetup, Episode, Factors, Interpolation, PerturbationSettings, Plant,
+    golden::scripted_action,
 };
 use faceoff_types::Seed;
 
@@ -18,7 +19,7 @@ fn setup(task: AirHockeyTask) -> BatchSetup {
     BatchSetup {
         task,
         interpolation: Interpolation::Cubic,
-        factors: Factors::ALL,
+        factors: Factors::EVALUATION,
         plant: Plant::mismatched(&settings, seed.model_mismatch()),
         settings,
         seed,
@@ -39,7 +40,7 @@ fn play(setup: BatchSetup, threads: usize, steps: u32) -> Vec<String> {
             let actions: Vec<f64> = batch
                 .observations()
                 .chunks(batch.observation_len())
-                .flat_map(|observation| strike(observation, step))
+                .flat_map(|observation| scripted_action(observation, step))
                 .collect();
             let outcomes = format!("{:?}", batch.step(&actions));
             all.push(format!("{outcomes} {:?}", batch.observations()));
@@ -71,7 +72,7 @@ fn worlds_run_the_episodes_of_the_evaluation_in_order() {
             let mut actions = vec![];
             for ((_, episode), row) in alone.iter().zip(&rows) {
                 assert_eq!(episode.observation(), row);
-                actions.extend(strike(row, step));
+                actions.extend(scripted_action(row, step));
             }
             let outcomes = batch.step(&actions).to_vec();
             for (w, outcome) in outcomes.iter().enumerate() {

@@ -4,7 +4,7 @@
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
     AirHockeyProfile, Interpolation, Plant, World,
-    golden::{episode_hash, play_episode, start_episode, strike},
+    golden::{episode_hash, play_episode, scripted_action, start_episode},
     model::INITIAL_Q,
 };
 
@@ -26,7 +26,7 @@ fn saved_episode_continues_with_the_same_bits() {
     for task in AirHockeyTask::ALL {
         let mut original = start_episode(task, AirHockeyProfile::Evaluation);
         for _ in 0..20 {
-            let action = strike(original.observation(), original.steps());
+            let action = scripted_action(original.observation(), original.steps());
             original.step(&action);
         }
         assert_eq!(episode_hash(original.clone()), episode_hash(original));

@@ -104,7 +104,7 @@ fn play_diverges(
     let mut episode = Episode::new(
         task,
         interpolation,
-        Factors::ALL,
+        Factors::EVALUATION,
         &settings,
         plant,
         seed.episode(task, 0),
@@ -155,7 +155,7 @@ const NARROW: Bounds = Bounds {
 fn episodes_stay_finite_for_hostile_commands() {
     let settings = PerturbationSettings::default();
     let mismatch_seed = Seed::from_number(11).model_mismatch();
-    let plant = Plant::for_factors(Factors::ALL, &settings, mismatch_seed);
+    let plant = Plant::for_factors(Factors::EVALUATION, &settings, mismatch_seed);
     let count = |bounds: Bounds| {
         let (mut diverged, mut played) = (0, 0);
         for task in AirHockeyTask::ALL {
@@ -185,14 +185,14 @@ fn episodes_stay_finite_for_hostile_commands() {
 fn divergence_in_a_game_names_the_hostile_robot() {
     let settings = PerturbationSettings::default();
     let seed = Seed::from_number(12);
-    let plant = Plant::for_factors(Factors::ALL, &settings, seed.model_mismatch());
+    let plant = Plant::for_factors(Factors::EVALUATION, &settings, seed.model_mismatch());
     let mut diverged_rallies = 0;
     for interpolation in interpolations() {
         for habit in HABITS {
             for hostile in 0..2 {
                 let mut game = Game::new(GameSetup {
                     interpolation: [interpolation; 2],
-                    factors: Factors::ALL,
+                    factors: Factors::EVALUATION,
                     plant: plant.clone(),
                     settings: settings.clone(),
                     seed,

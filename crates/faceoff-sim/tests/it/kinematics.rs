@@ -21,13 +21,13 @@ fn positions_rotations_and_jacobian_match() {
         for (key, frame) in [("4", link_4), ("7", link_7), ("ee", ee)] {
             let position = flat(&case[format!("pos_{key}")]);
             let rotation = flat(&case[format!("rot_{key}")]);
-            assert!(max_difference(&position, &frame.origin.lane(0)) < 1e-6);
+            assert!(max_difference(&position, &frame.origin.to_array()) < 1e-6);
             assert!(max_difference(&rotation, &frame.rotation(0)) < 1e-6);
         }
         let mut jacobian = [0.0; 6 * JOINTS];
         for joint in 0..JOINTS {
-            let linear = kinematics.axes[joint].velocity_at(ee.origin).lane(0);
-            let angular = kinematics.axes[joint].angular.lane(0);
+            let linear = kinematics.axes[joint].velocity_at(ee.origin).to_array();
+            let angular = kinematics.axes[joint].angular.to_array();
             for row in 0..3 {
                 jacobian[JOINTS * row + joint] = linear[row];
                 jacobian[JOINTS * (row + 3) + joint] = angular[row];

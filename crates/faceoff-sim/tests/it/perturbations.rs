@@ -177,7 +177,7 @@ fn factor_does_not_change_draws_of_other_factors() {
     // The air flow's draws do not depend on the other factors: the worlds agree bit for bit.
     let air = Factors::only(Factor::Disturbance);
     let mut alone = episode(AirHockeyTask::Defend, air, 5);
-    let mut together = episode(AirHockeyTask::Defend, Factors::ALL, 5);
+    let mut together = episode(AirHockeyTask::Defend, Factors::EVALUATION, 5);
     for _ in 0..30 {
         alone.step(&hold());
         together.step(&hold());
@@ -186,7 +186,7 @@ fn factor_does_not_change_draws_of_other_factors() {
     // The initial state depends on no factor.
     assert_eq!(
         episode(AirHockeyTask::Hit, Factors::NONE, 9).state(),
-        episode(AirHockeyTask::Hit, Factors::ALL, 9).state()
+        episode(AirHockeyTask::Hit, Factors::EVALUATION, 9).state()
     );
 }
 

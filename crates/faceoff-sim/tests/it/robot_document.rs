@@ -138,9 +138,9 @@ fn tool_start_pose_and_table_match_the_model() {
 fn quoted_measurements_match_the_simulator() {
     let puck_out_of_reach = [0.8, 0.4, 0.0, 0.0, 0.0, 0.0];
     let mut world = World::with_robots(&Plant::nominal(), 1, puck_out_of_reach);
-    let [x, _, z] = world.kinematics(0).end_effector.origin.lane(0);
+    let [x, _, z] = world.kinematics(0).end_effector.origin.to_array();
     hold_for(&mut world, 2000);
-    let [sagged_x, _, sagged_z] = world.kinematics(0).end_effector.origin.lane(0);
+    let [sagged_x, _, sagged_z] = world.kinematics(0).end_effector.origin.to_array();
     assert_documented(&format!(
         "{:.1} mm lower and {:.1} mm nearer",
         1e3 * (z - sagged_z),

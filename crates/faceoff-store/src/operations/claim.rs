@@ -71,6 +71,7 @@ impl Store {
                     format!("{MAX_LEASES} workers died while running it")
                 } else {
                     match describe_job(tx, &leased, worker).await {
+                        // It waits outside the queue until it may start.
                         Ok(None) => {
                             queue::park(tx, leased.id.0).await?;
                             continue;

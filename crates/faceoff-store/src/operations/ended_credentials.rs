@@ -8,7 +8,7 @@ use crate::{
     operations::webhooks::disable,
     tables::{
         invitations::{self, Invitation, InvitationRole},
-        tokens::{self, Maker, Token, TokenOwner},
+        tokens::{self, Creator, Token, TokenOwner},
         users::{self, User},
         webhooks::{self, Webhook},
     },
@@ -29,55 +29,56 @@ pub struct EndedCredentials {
     pub restored_users: Vec<User>,
 }
 
-/// Ends all that a user has made. `kept` is the token of the request, which stays valid.
-pub(crate) async fn end_made_by(
+/// Revokes the credentials that a user has created. `kept_token` is the token of the request, which stays valid.
+pub(crate) async fn revoke_created_by(
     tx: &mut Tx,
     user: UserId,
-    kept: Option<TokenId>,
+    kept_token: Option<TokenId>,
     reason: &str,
 ) -> Result<EndedCredentials> {
-    let maker = Maker {
+    let creator = Creator {
         user: Some(user),
         token: None,
     };
-    end_made(tx, maker, kept, reason).await
+    revoke_created(tx, creator, kept_token, reason).await
 }
 
-/// Ends all that was made with a token.
-pub(crate) async fn end_made_with(
+/// Revokes the credentials that were created with a token.
+pub(crate) async fn revoke_created_with(
     tx: &mut Tx,
     token: TokenId,
-    kept: Option<TokenId>,
+    kept_token: Option<TokenId>,
     reason: &str,
 ) -> Result<EndedCredentials> {
-    let maker = Maker {
+    let creator = Creator {
         user: None,
         token: Some(token),
     };
-    end_made(tx, maker, kept, reason).await
+    revoke_created(tx, creator, kept_token, reason).await
 }
 
-/// Ends what this maker has made, and what was made with the tokens among it, also with those that had ended before.
+/// Revokes the credentials of this creator, and those that were created with its tokens, including tokens that had expired or were revoked
+/// before.
 #[boxed]
-async fn end_made(
+async fn revoke_created(
     tx: &mut Tx,
-    maker: Maker,
-    kept: Option<TokenId>,
+    creator: Creator,
+    kept_token: Option<TokenId>,
     reason: &str,
 ) -> Result<EndedCredentials> {
     let now = tx.now;
     let mut ended = EndedCredentials::default();
-    let mut makers = vec![maker];
+    let mut creators = vec![creator];
     let mut visited = HashSet::new();
-    while let Some(maker) = makers.pop() {
-        if !visited.insert(maker) {
+    while let Some(creator) = creators.pop() {
+        if !visited.insert(creator) {
             continue;
         }
-        for token in tokens::made(tx, maker).await? {
-            if Some(token.id) == kept {
+        for token in tokens::created_by(tx, creator).await? {
+            if Some(token.id) == kept_token {
                 continue;
             }
-            makers.push(Maker {
+            creators.push(Creator {
                 user: None,
                 token: Some(token.id),
             });
@@ -86,29 +87,29 @@ async fn end_made(
                 ended.tokens.push(tokens::find(tx, token.id).await?);
             }
         }
-        for invitation in invitations::open_made(tx, maker, now).await? {
+        for invitation in invitations::open_created_by(tx, creator, now).await? {
             let revoked = revoke_invitation(tx, invitation).await?;
             ended.invitations.push(revoked);
         }
-        for webhook in webhooks::enabled_made(tx, maker).await? {
+        for webhook in webhooks::enabled_created_by(tx, creator).await? {
             let id = webhook.id;
             disable(tx, webhook, reason.to_owned()).await?;
             ended.webhooks.push(webhooks::find(tx, id).await?);
         }
     }
-    let makers: Vec<Maker> = visited.into_iter().collect();
-    ended.restored_users = restored_by(tx, &makers).await?;
-    ended.remaining_users = joined_by(tx, makers).await?;
+    let creators: Vec<Creator> = visited.into_iter().collect();
+    ended.restored_users = restored_by(tx, &creators).await?;
+    ended.remaining_users = joined_by(tx, creators).await?;
     Ok(ended)
 }
 
-/// The active users who got access again by links of these makers, other than the makers themselves, by name.
-async fn restored_by(tx: &mut Tx, makers: &[Maker]) -> Result<Vec<User>> {
+/// The active users who got access again by links of these creators, other than the creators themselves, by name.
+async fn restored_by(tx: &mut Tx, creators: &[Creator]) -> Result<Vec<User>> {
     let mut found = BTreeMap::new();
-    for maker in makers {
-        for user in users::invited(tx, *maker, true).await? {
-            let is_maker = makers.iter().any(|maker| maker.user == Some(user.id));
-            if user.left_at.is_none() && !is_maker {
+    for creator in creators {
+        for user in users::invited(tx, *creator, true).await? {
+            let is_creator = creators.iter().any(|creator| creator.user == Some(user.id));
+            if user.left_at.is_none() && !is_creator {
                 found.insert(user.name.to_string(), user);
             }
         }
@@ -116,16 +117,16 @@ async fn restored_by(tx: &mut Tx, makers: &[Maker]) -> Result<Vec<User>> {
     Ok(found.into_values().collect())
 }
 
-/// The active users who joined by invitations of these makers, or of users who had joined so, by name.
-async fn joined_by(tx: &mut Tx, mut makers: Vec<Maker>) -> Result<Vec<User>> {
-    let mut visited: HashSet<UserId> = makers.iter().filter_map(|maker| maker.user).collect();
+/// The active users who joined by invitations of these creators, or of users who had joined so, by name.
+async fn joined_by(tx: &mut Tx, mut creators: Vec<Creator>) -> Result<Vec<User>> {
+    let mut visited: HashSet<UserId> = creators.iter().filter_map(|creator| creator.user).collect();
     let mut found = BTreeMap::new();
-    while let Some(maker) = makers.pop() {
-        for user in users::invited(tx, maker, false).await? {
+    while let Some(creator) = creators.pop() {
+        for user in users::invited(tx, creator, false).await? {
             if !visited.insert(user.id) {
                 continue;
             }
-            makers.push(Maker {
+            creators.push(Creator {
                 user: Some(user.id),
                 token: None,
             });

@@ -13,7 +13,7 @@ use crate::{
     queries,
     store::Store,
     tables::{
-        counting_evaluations, days, entries,
+        counting_evaluations, days, evaluation_specs,
         evaluations::Evaluation,
         plan::RunPlan,
         season, stage_runtimes,
@@ -106,7 +106,7 @@ impl Store {
                 rerun_of: None,
             };
             queue_evaluation(tx, new, &setup, 0).await?;
-            entries::set_extra(tx, id, reason).await?;
+            evaluation_specs::set_extra(tx, id, reason).await?;
             let reason = reason.to_owned();
             tx.record(Subject::Evaluation(id), Event::ExtraTurnGiven { reason });
             queries::evaluations::find(tx, id).await

@@ -21,11 +21,11 @@ use std::{
 
 /// The table in which sqlx records the migrations that were run.
 const MIGRATION_TABLE: &str = "_sqlx_migrations";
-/// Number of SQLite's instructions between two looks at the deadline.
+/// SQLite checks the deadline each time it has executed this number of instructions.
 const PROGRESS_INTERVAL: i32 = 100_000;
-/// How many times its size an archive's database can become by its migrations, which may copy each of its tables, ...
+/// The migrations, which may copy each table, can grow an archive's database to this multiple of its size.
 const MAX_GROWTH: u32 = 3;
-/// ... and the number of pages (mostly of 4 KiB) that may come on top, for small databases.
+/// In addition to [`MAX_GROWTH`], the database can grow by this number of pages (mostly of 4 KiB), since small databases need more.
 const MAX_ADDED_PAGES: u32 = 1 << 14;
 
 /// The database of a data folder.
@@ -87,7 +87,7 @@ impl Store {
         let mut connection = deadline.connect(&read_only).await?;
         let checked = check_unchanged(&mut connection).await;
         connection.close().await?;
-        let page_count = deadline.judge(checked)?;
+        let page_count = deadline.refuse_if_passed(checked)?;
 
         let max_page_count = page_count
             .saturating_mul(MAX_GROWTH)
@@ -100,7 +100,7 @@ impl Store {
         let mut connection = deadline.connect(&writable).await?;
         let migrated = migrate(&mut connection, now).await;
         connection.close().await?;
-        deadline.judge(migrated)
+        deadline.refuse_if_passed(migrated)
     }
 }
 
@@ -124,7 +124,7 @@ impl Deadline {
     }
 
     /// The outcome of a step, or the refusal if it ended because of the deadline.
-    fn judge<T>(self, outcome: Result<T>) -> Result<T> {
+    fn refuse_if_passed<T>(self, outcome: Result<T>) -> Result<T> {
         match outcome {
             Err(_) if Instant::now() >= self.at => Err(refusal(format_args!(
                 "its check takes longer than {} minutes",

@@ -6,7 +6,7 @@ use crate::{
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
-        ended_credentials::{self, EndedCredentials, end_made_by},
+        ended_credentials::{self, EndedCredentials, revoke_created_by},
         requester::{self, Requester},
         tokens::{NewToken, add_token, revoke_all},
     },
@@ -108,12 +108,12 @@ fn check_open(invitation: &Invitation, now: Timestamp) -> Result<()> {
 /// Adds an invitation whose expiry has been checked.
 pub(super) async fn invite(tx: &mut Tx, new: NewInvitation) -> Result<Invitation> {
     let now = tx.now;
-    let maker = requester::check(tx, &new.requester, now).await?;
+    let creator = requester::check(tx, &new.requester, now).await?;
     let invitation = Invitation {
         id: InvitationId::new(),
         role: new.role,
         note: new.note,
-        maker,
+        creator,
         created_at: now,
         expires_at: new.expires_at,
         state: InvitationState::Open,
@@ -216,7 +216,7 @@ async fn restore_access(
         users::set_password(tx, id, password).await?;
         tx.record(Subject::User(id), Event::PasswordSet);
     }
-    end_made_by(tx, id, None, "the user who made it got new access").await
+    revoke_created_by(tx, id, None, "the user who made it got new access").await
 }
 
 async fn join(tx: &mut Tx, mut request: JoinRequest) -> Result<JoinOutcome> {

@@ -7,7 +7,7 @@ use crate::{
     queue::NewJob,
     tables::{
         days,
-        entries::{self, Entry},
+        evaluation_specs::{self, EvaluationSpec},
         plan::RunPlan,
         runs::Run,
     },
@@ -61,7 +61,7 @@ pub(crate) async fn queue_evaluation(
         ..purpose::SHARD
     };
     runs::queue_run(tx, &run, &[requested.submission], job, requested.team).await?;
-    let entry = Entry {
+    let spec = EvaluationSpec {
         id: requested.id,
         submission: requested.submission,
         team: requested.team,
@@ -71,17 +71,17 @@ pub(crate) async fn queue_evaluation(
         rerun_of: requested.rerun_of,
     };
     let now = tx.now;
-    entries::insert(tx, &entry, now).await?;
+    evaluation_specs::insert(tx, &spec, now).await?;
     tx.record(
-        Subject::Evaluation(entry.id),
+        Subject::Evaluation(spec.id),
         Event::EvaluationQueued {
-            team: entry.team,
-            submission: entry.submission,
-            stage: Some(entry.stage_day.stage),
-            day: entry.stage_day.date,
-            run: entry.run,
-            rerun_of: entry.rerun_of,
+            team: spec.team,
+            submission: spec.submission,
+            stage: Some(spec.stage_day.stage),
+            day: spec.stage_day.date,
+            run: spec.run,
+            rerun_of: spec.rerun_of,
         },
     );
-    Ok(entry.id)
+    Ok(spec.id)
 }

@@ -11,7 +11,7 @@ use crate::{
     store::Store,
     tables::{
         counting_evaluations, days,
-        entries::{self, Entry},
+        evaluation_specs::{self, EvaluationSpec},
         evaluations::{self, EvaluationState, Failure, ProposedEvaluation},
         freezes,
         plan::RunPlan,
@@ -69,7 +69,8 @@ async fn add_proposal(tx: &mut Tx, proposal: &Proposal, proposed: Vec<ProposedRu
         };
         runs::queue_run(tx, &run, &[proposed_run.submission], job, proposed_run.team).await?;
         let owner = (proposed_run.submission, proposed_run.team);
-        entries::insert_proposed(tx, proposal, owner, run.id, proposed_run.replaces).await?;
+        evaluation_specs::insert_proposed(tx, proposal, owner, run.id, proposed_run.replaces)
+            .await?;
     }
     let event = Event::ProposalMade {
         stage: proposal.stage,
@@ -89,36 +90,36 @@ async fn runs_to_repeat(
 ) -> Result<Vec<(u32, ProposedRun)>> {
     let mut all = Vec::with_capacity(ids.len());
     for id in ids {
-        all.push(entries::find(tx, *id).await?);
+        all.push(evaluation_specs::find(tx, *id).await?);
     }
     let has_newest_rules =
-        |entry: &Entry| newest.is_some_and(|stage| stage.rules.number == entry.revision);
+        |spec: &EvaluationSpec| newest.is_some_and(|stage| stage.rules.number == spec.revision);
     let done_teams: HashSet<TeamId> = all
         .iter()
-        .filter(|entry| has_newest_rules(entry))
-        .map(|entry| entry.team)
+        .filter(|spec| has_newest_rules(spec))
+        .map(|spec| spec.team)
         .collect();
     let mut proposed = Vec::new();
-    for entry in all
+    for spec in all
         .into_iter()
-        .filter(|entry| !done_teams.contains(&entry.team))
+        .filter(|spec| !done_teams.contains(&spec.team))
     {
-        let submission = submissions::find(tx, entry.submission).await?;
+        let submission = submissions::find(tx, spec.submission).await?;
         // In a proposal for several teams, a submission with a deleted bundle is left out. A proposal for this submission
         // alone is refused below, with the reason.
         let is_deleted = ids.len() > 1 && submission.bundle_removed.is_some();
         if is_deleted || newest.is_some_and(|stage| stage.check_accepts(&submission).is_err()) {
             continue;
         }
-        let run = run_rows::find(tx, entry.run).await?;
+        let run = run_rows::find(tx, spec.run).await?;
         let (revision, ruleset, plan) = match newest {
-            None => (entry.revision, run.ruleset, run.plan),
+            None => (spec.revision, run.ruleset, run.plan),
             Some(stage) => (stage.rules.number, stage.rules.rules.ruleset, stage.plan()),
         };
         let proposed_run = ProposedRun {
-            submission: entry.submission,
-            team: entry.team,
-            replaces: Some(entry.id),
+            submission: spec.submission,
+            team: spec.team,
+            replaces: Some(spec.id),
             seed: run.seed,
             ruleset,
             plan,
@@ -209,7 +210,7 @@ impl Store {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
             let stage_day = match scope {
-                Reevaluation::Evaluation(id) => entries::find(tx, id).await?.stage_day,
+                Reevaluation::Evaluation(id) => evaluation_specs::find(tx, id).await?.stage_day,
                 Reevaluation::Day(stage_day) | Reevaluation::Rules(stage_day) => stage_day,
             };
             sign_offs::check_not_signed_off(tx, stage_day.stage).await?;
@@ -384,7 +385,7 @@ async fn apply_evaluation(
         void(tx, replaced, &void_reason).await?;
     }
     let now = tx.now;
-    entries::set_counting(tx, evaluation.id, stage_day.date, now).await?;
+    evaluation_specs::set_counting(tx, evaluation.id, stage_day.date, now).await?;
     let subject = Subject::Evaluation(evaluation.id);
     let applied = Event::EvaluationApplied {
         proposal: proposal.id,

@@ -4,14 +4,14 @@
 use crate::{
     error::Result,
     event::{Event, Subject},
-    tables::{days, entries, evaluations},
+    tables::{days, evaluation_specs, evaluations},
     write::Tx,
 };
 use faceoff_types::{EvaluationId, StageDay};
 
 /// Releases the day of an evaluation that has just ended, if it was the last open one, in the same transaction.
 pub(crate) async fn release_if_over(tx: &mut Tx, evaluation: EvaluationId) -> Result<()> {
-    let stage_day = entries::find(tx, evaluation).await?.stage_day;
+    let stage_day = evaluation_specs::find(tx, evaluation).await?.stage_day;
     release_unless_open(tx, stage_day).await
 }
 

@@ -5,7 +5,7 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     tables::{
-        tokens::{self, Maker},
+        tokens::{self, Creator},
         users,
     },
 };
@@ -23,10 +23,10 @@ pub struct Requester {
 }
 
 impl Requester {
-    /// The maker of what the requester makes.
+    /// The creator of what the requester makes.
     #[must_use]
-    pub fn maker(&self) -> Maker {
-        Maker {
+    pub fn creator(&self) -> Creator {
+        Creator {
             user: self.user,
             token: self.token.map(|(id, _)| id),
         }
@@ -55,15 +55,15 @@ pub(crate) async fn is_valid(
     }
 }
 
-/// Returns the maker of what the requester makes. [`StoreError::TokenInvalid`] if the requester has lost the right to it.
+/// Returns the creator of what the requester makes. [`StoreError::TokenInvalid`] if the requester has lost the right to it.
 #[boxed]
 pub(crate) async fn check(
     connection: &mut SqliteConnection,
     requester: &Requester,
     now: Timestamp,
-) -> Result<Maker> {
+) -> Result<Creator> {
     if is_valid(connection, requester, now).await? {
-        Ok(requester.maker())
+        Ok(requester.creator())
     } else {
         Err(StoreError::TokenInvalid)
     }

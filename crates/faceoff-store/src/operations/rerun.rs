@@ -10,7 +10,7 @@ use crate::{
     store::Store,
     tables::{
         days,
-        entries::{self, Entry},
+        evaluation_specs::{self, EvaluationSpec},
         evaluations::{self, Evaluation, EvaluationState},
         runs, season, sign_offs, teams,
     },
@@ -23,37 +23,37 @@ use jiff::Timestamp;
 /// third rerun, so a day ends even if the fault persists.
 pub const RERUN_PAUSES_S: [u32; 2] = [60, 600];
 
-async fn queue_rerun(tx: &mut Tx, entry: Entry, delay_s: u32) -> Result<EvaluationId> {
-    let run = runs::find(tx, entry.run).await?;
+async fn queue_rerun(tx: &mut Tx, spec: EvaluationSpec, delay_s: u32) -> Result<EvaluationId> {
+    let run = runs::find(tx, spec.run).await?;
     let new = NewEvaluation {
         id: EvaluationId::new(),
-        submission: entry.submission,
-        team: entry.team,
-        rerun_of: Some(entry.id),
+        submission: spec.submission,
+        team: spec.team,
+        rerun_of: Some(spec.id),
     };
     let setup = DaySetup {
-        stage_day: entry.stage_day,
-        revision: entry.revision,
+        stage_day: spec.stage_day,
+        revision: spec.revision,
         seed: run.seed,
         ruleset: run.ruleset,
         plan: run.plan,
     };
     let id = queue_evaluation(tx, new, &setup, delay_s).await?;
-    entries::copy_extra(tx, id, entry.id).await?;
+    evaluation_specs::copy_extra(tx, id, spec.id).await?;
     Ok(id)
 }
 
 /// Queues a rerun of an evaluation that has just ended by a platform fault. Does nothing if its day is released or
 /// past its deadline, or after the last automatic rerun.
 pub(crate) async fn rerun_after_platform_fault(tx: &mut Tx, id: EvaluationId) -> Result<()> {
-    let entry = entries::find(tx, id).await?;
-    let day = days::find(tx, entry.stage_day).await?;
+    let spec = evaluation_specs::find(tx, id).await?;
+    let day = days::find(tx, spec.stage_day).await?;
     if day.released_at.is_some() || day.deadline_at.is_some_and(|at| at <= tx.now) {
         return Ok(());
     }
-    let failures = evaluations::count_platform_failed(tx, entry.team, entry.stage_day).await?;
+    let failures = evaluations::count_platform_failed(tx, spec.team, spec.stage_day).await?;
     if let Some(delay_s) = RERUN_PAUSES_S.get(failures.saturating_sub(1)) {
-        queue_rerun(tx, entry, *delay_s).await?;
+        queue_rerun(tx, spec, *delay_s).await?;
     }
     Ok(())
 }
@@ -85,10 +85,10 @@ impl Store {
                      platform fault can be rerun",
                 );
             }
-            let entry = entries::find(tx, id).await?;
-            sign_offs::check_not_signed_off(tx, entry.stage_day.stage).await?;
-            teams::check_may_compete(tx, entry.team).await?;
-            let id = queue_rerun(tx, entry, 0).await?;
+            let spec = evaluation_specs::find(tx, id).await?;
+            sign_offs::check_not_signed_off(tx, spec.stage_day.stage).await?;
+            teams::check_may_compete(tx, spec.team).await?;
+            let id = queue_rerun(tx, spec, 0).await?;
             queries::evaluations::find(tx, id).await
         })
         .await

@@ -12,7 +12,7 @@ use crate::{
     queries,
     store::Store,
     tables::{
-        counting_evaluations, days, entrants, entries,
+        counting_evaluations, days, entrants, evaluation_specs,
         evaluations::{Evaluation, Failure},
         rounds,
         rulings::Ruling,
@@ -75,7 +75,7 @@ impl Store {
         now: Timestamp,
     ) -> Result<Evaluation> {
         self.write(actor, now, async |tx| {
-            let stage_day = entries::find(tx, id).await?.stage_day;
+            let stage_day = evaluation_specs::find(tx, id).await?.stage_day;
             sign_offs::check_not_signed_off(tx, stage_day.stage).await?;
             let counting = counting_evaluations::of_day(tx, stage_day, None).await?;
             if !counting.iter().any(|evaluation| evaluation.id == id && evaluation.counts) {

@@ -13,7 +13,7 @@ use crate::{
     },
     write::Tx,
 };
-use faceoff_types::{Retention, StageId, StageName, StageRules, StageSettings, Zone};
+use faceoff_types::{IanaTimeZone, Retention, StageId, StageName, StageRules, StageSettings};
 use jiff::Timestamp;
 
 /// A stage to be created.
@@ -26,7 +26,7 @@ pub struct NewStage {
     /// `None`: it has no end yet.
     pub closes_at: Option<Timestamp>,
     /// Time zone of its days' dates.
-    pub zone: Zone,
+    pub zone: IanaTimeZone,
     /// Rules that scores depend on.
     pub rules: StageRules,
     /// Settings that scores do not depend on.
@@ -42,7 +42,7 @@ pub struct StageChange {
     /// Only before the stage has closed; `Some(None)`: it has no end yet.
     pub closes_at: Option<Option<Timestamp>>,
     /// Only before the cutoff of its first day.
-    pub zone: Option<Zone>,
+    pub zone: Option<IanaTimeZone>,
     /// In an open stage this creates another revision.
     pub rules: Option<StageRules>,
     /// Settings that scores do not depend on.
@@ -314,7 +314,7 @@ impl Store {
         &self,
         rules: StageRules,
         settings: StageSettings,
-        zone: Zone,
+        zone: IanaTimeZone,
         now: Timestamp,
     ) -> Result<()> {
         self.write(Actor::Organiser, now, async |tx| {

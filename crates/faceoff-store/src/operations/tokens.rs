@@ -6,7 +6,7 @@ use crate::{
     error::{Result, StoreError},
     event::{Actor, Event},
     operations::{
-        ended_credentials::{EndedCredentials, end_made_with, revoke_token, subject},
+        ended_credentials::{EndedCredentials, revoke_created_with, revoke_token, subject},
         requester::{self, Requester},
     },
     store::Store,
@@ -81,7 +81,7 @@ const HOST_TOKEN_NAME: &str = "admin-token";
 /// Adds a token. [`StoreError::Conflict`] if its owner has [`MAX_TOKENS`].
 pub(crate) async fn add_token(tx: &mut Tx, new: NewToken) -> Result<Token> {
     let now = tx.now;
-    let maker = requester::check(tx, &new.requester, now).await?;
+    let creator = requester::check(tx, &new.requester, now).await?;
     if tokens::count_valid(tx, new.owner, now).await? >= MAX_TOKENS {
         return StoreError::conflict(format!(
             "there are {MAX_TOKENS} tokens already, which is the limit: revoke one that is not needed \
@@ -99,7 +99,7 @@ pub(crate) async fn add_token(tx: &mut Tx, new: NewToken) -> Result<Token> {
         kind: new.kind,
         owner: new.owner,
         name: new.name,
-        maker,
+        creator,
         created_at: now,
         expires_at: new.expires_at,
         last_used_at: None,
@@ -262,7 +262,7 @@ impl Store {
     }
 
     /// Replaces the secret of a token; the old secret is invalid from now on, and its expiry remains. From now on it belongs to
-    /// what the requester has made, unless its maker is the same or it renews itself. [`StoreError::Conflict`] if the token is a session,
+    /// what the requester has made, unless its creator is the same or it renews itself. [`StoreError::Conflict`] if the token is a session,
     /// is expired or revoked, or is the host's, whose file would still have the old secret.
     #[boxed]
     pub async fn rotate_token(
@@ -277,8 +277,8 @@ impl Store {
             let new_maker = requester::check(tx, &requester, now).await?;
             let token = tokens::find(tx, id).await?;
             // Otherwise tokens made with a stolen one could cut themselves off from it.
-            let is_same = new_maker.token == Some(id) || new_maker.user == token.maker.user;
-            let maker = if is_same { token.maker } else { new_maker };
+            let is_same = new_maker.token == Some(id) || new_maker.user == token.creator.user;
+            let creator = if is_same { token.creator } else { new_maker };
             if token.kind == TokenKind::Session {
                 return StoreError::conflict(
                     "a session has no secret that could be rotated: end it, or sign in again",
@@ -295,7 +295,7 @@ impl Store {
                     "the token is revoked or has expired, which is final: create another one",
                 );
             }
-            tokens::set_hash(tx, id, hash, maker).await?;
+            tokens::set_hash(tx, id, hash, creator).await?;
             let name = token.name;
             tx.record(
                 subject(token.owner),
@@ -324,7 +324,7 @@ impl Store {
                 EndMade::Keep => EndedCredentials::default(),
                 EndMade::Except(kept) => {
                     let reason = "the token with which it was made was revoked";
-                    end_made_with(tx, id, kept, reason).await?
+                    revoke_created_with(tx, id, kept, reason).await?
                 }
             };
             Ok(RevokedToken {

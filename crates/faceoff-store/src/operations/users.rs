@@ -5,7 +5,7 @@ use crate::{
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
-        ended_credentials::{EndedCredentials, end_made_by},
+        ended_credentials::{EndedCredentials, revoke_created_by},
         tokens::revoke_all,
     },
     store::Store,
@@ -60,7 +60,7 @@ impl Store {
             tx.record(Subject::User(id), Event::PasswordSet);
             let reason = "the user who made it has set a new password";
             let mut ended = if had_password {
-                end_made_by(tx, id, Some(used_token), reason).await?
+                revoke_created_by(tx, id, Some(used_token), reason).await?
             } else {
                 EndedCredentials::default()
             };
@@ -91,7 +91,7 @@ impl Store {
             users::set_left(tx, id, now).await?;
             revoke_all(tx, TokenOwner::User(id), None).await?;
             let reason = "the account of the user who made it is closed";
-            let ended = end_made_by(tx, id, None, reason).await?;
+            let ended = revoke_created_by(tx, id, None, reason).await?;
             // Checked last: a token of the host may have ended, too.
             if is_last && tokens::count_valid(tx, TokenOwner::Host, now).await? == 0 {
                 return StoreError::conflict(format!(

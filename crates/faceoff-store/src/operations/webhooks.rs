@@ -155,7 +155,7 @@ impl Store {
         now: Timestamp,
     ) -> Result<Webhook> {
         self.write(actor, now, async |tx| {
-            let maker = requester::check(tx, &new.requester, now).await?;
+            let creator = requester::check(tx, &new.requester, now).await?;
             let limit = match new.team {
                 Some(_) => MAX_TEAM_WEBHOOKS,
                 None => MAX_ORGANISER_WEBHOOKS,
@@ -172,7 +172,7 @@ impl Store {
                 name: new.name,
                 url: new.url,
                 topics: new.topics,
-                maker,
+                creator,
                 created_at: now,
                 seen: events::newest_id(tx).await?,
                 failing_since: None,
@@ -200,7 +200,7 @@ impl Store {
         now: Timestamp,
     ) -> Result<Webhook> {
         self.write(actor, now, async |tx| {
-            let maker = requester::check(tx, &change.requester, now).await?;
+            let creator = requester::check(tx, &change.requester, now).await?;
             let current = webhooks::find(tx, id).await?;
             let mut webhook = current.clone();
             webhook.name = change.name.unwrap_or(webhook.name);
@@ -208,13 +208,13 @@ impl Store {
             if webhook.url != current.url {
                 // Failures of the old address do not count for the new one.
                 webhook.failing_since = None;
-                webhook.maker = maker;
+                webhook.creator = creator;
             }
             webhook.topics = change.topics.unwrap_or(webhook.topics);
             if change.enable && webhook.disabled.is_some() {
                 webhook.disabled = None;
                 webhook.failing_since = None;
-                webhook.maker = maker;
+                webhook.creator = creator;
                 webhook.seen = events::newest_id(tx).await?;
             }
             if webhook != current {

@@ -4,8 +4,8 @@
 
 use crate::{column::Instant, error::Result, write::Tx};
 
-/// A share of the queue. Slot time is divided equally among the lanes of one urgency that have waiting
-/// jobs.
+/// A lane: one of several queues in parallel, each for one class of jobs (validation runs, shards, games …), like a partition of
+/// Slurm. Slot time is divided equally among the lanes of one urgency that have waiting jobs.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Lane {
     pub(crate) name: &'static str,
@@ -15,8 +15,8 @@ pub(crate) struct Lane {
     pub(crate) rank: u32,
 }
 
-/// Number of an account: the jobs of one owner in one lane. Slot time of a lane is divided equally among the accounts with
-/// waiting jobs.
+/// The number of an account: the record of the slot time that one owner (a team) has used in one lane, as in the fair-share scheduling of
+/// Slurm. It is no user account. Slot time of a lane is divided equally among the accounts with waiting jobs.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Account(pub(crate) i64);
 

@@ -3,7 +3,7 @@
 use crate::{
     column::{Bytes32, Instant},
     error::{Result, StoreError},
-    tables::tokens::Maker,
+    tables::tokens::Creator,
 };
 use faceoff_types::{InvitationId, TeamId, TokenId, UserId};
 use jiff::Timestamp;
@@ -63,7 +63,7 @@ pub struct Invitation {
     pub role: InvitationRole,
     /// A note of its author, to recognise it in lists.
     pub note: String,
-    pub maker: Maker,
+    pub creator: Creator,
     pub created_at: Timestamp,
     pub expires_at: Timestamp,
     pub state: InvitationState,
@@ -99,7 +99,7 @@ impl TryFrom<InvitationRow> for Invitation {
             id: row.id,
             role: InvitationRole::from_columns(&row.role, row.team_id, row.person_id)?,
             note: row.note,
-            maker: Maker {
+            creator: Creator {
                 user: row.made_by,
                 token: row.made_with,
             },
@@ -200,16 +200,16 @@ pub(crate) async fn by_code(
 }
 
 /// The valid, unused invitations at `now` that this user has made, or that were made with this token.
-pub(crate) async fn open_made(
+pub(crate) async fn open_created_by(
     connection: &mut SqliteConnection,
-    maker: Maker,
+    creator: Creator,
     now: Timestamp,
 ) -> Result<Vec<Invitation>> {
     let rows = select_invitations!(
         "WHERE (made_by = ?1 OR made_with = ?2) AND accepted_at IS NULL AND revoked_at IS NULL AND expires_at > ?3
          ORDER BY created_at, id",
-        maker.user,
-        maker.token,
+        creator.user,
+        creator.token,
         Instant(now)
     )
     .fetch_all(connection)
@@ -264,8 +264,8 @@ pub(crate) async fn insert(
         team,
         user,
         invitation.note,
-        invitation.maker.user,
-        invitation.maker.token,
+        invitation.creator.user,
+        invitation.creator.token,
         Instant(invitation.created_at),
         Instant(invitation.expires_at),
     )

@@ -7,7 +7,8 @@ use crate::{
     tables::{plan::RunPlan, sign_offs::SignOff},
 };
 use faceoff_types::{
-    DayDeadline, SeedLabel, StageDay, StageId, StageName, StageRules, StageSettings, TeamId, Zone,
+    DayDeadline, IanaTimeZone, SeedLabel, StageDay, StageId, StageName, StageRules, StageSettings,
+    TeamId,
 };
 use jiff::{SignedDuration, Timestamp, civil::Date};
 use sqlx::SqliteConnection;
@@ -24,7 +25,7 @@ pub struct Stage {
     /// From then on none of its days can start; `None`: no end is set.
     pub closes_at: Option<Timestamp>,
     /// Time zone of its dates.
-    pub zone: Zone,
+    pub zone: IanaTimeZone,
     /// Everything that scores do not depend on.
     pub settings: StageSettings,
     /// Everything that scores depend on: the current revision.
@@ -158,7 +159,7 @@ struct StageRow {
     name: StageName,
     opens_at: Instant,
     closes_at: Option<Instant>,
-    zone: Zone,
+    zone: IanaTimeZone,
     settings: Json<StageSettings>,
     names_seeds: bool,
     configured: bool,

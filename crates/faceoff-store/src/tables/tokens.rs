@@ -73,7 +73,7 @@ impl TokenKind {
 /// Who made a credential (a token, an invitation or a webhook), or gave it its current secret. It ends with that user's account, and
 /// when the user gets a new password or new access.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub struct Maker {
+pub struct Creator {
     /// `None`: the host, a visitor or the server.
     pub user: Option<UserId>,
     /// The token or session of the request.
@@ -89,7 +89,7 @@ pub struct Token {
     pub owner: TokenOwner,
     /// A label, chosen by its owner.
     pub name: String,
-    pub maker: Maker,
+    pub creator: Creator,
     pub created_at: Timestamp,
     /// `None`: it does not expire.
     pub expires_at: Option<Timestamp>,
@@ -130,7 +130,7 @@ impl From<TokenRow> for Token {
             },
             owner: TokenOwner::from_columns(row.team_id, row.person_id),
             name: row.name,
-            maker: Maker {
+            creator: Creator {
                 user: row.made_by,
                 token: row.made_with,
             },
@@ -355,11 +355,14 @@ pub(crate) async fn hash_of(connection: &mut SqliteConnection, id: TokenId) -> R
 }
 
 /// The tokens and sessions that this user has made, or that were made with this token, also those that are no longer valid.
-pub(crate) async fn made(connection: &mut SqliteConnection, maker: Maker) -> Result<Vec<Token>> {
+pub(crate) async fn created_by(
+    connection: &mut SqliteConnection,
+    creator: Creator,
+) -> Result<Vec<Token>> {
     let rows = select_tokens!(
         "WHERE made_by = ? OR made_with = ? ORDER BY created_at, id",
-        maker.user,
-        maker.token
+        creator.user,
+        creator.token
     )
     .fetch_all(connection)
     .await?;
@@ -402,8 +405,8 @@ pub(crate) async fn insert(
         owner.team(),
         owner.user(),
         token.name,
-        token.maker.user,
-        token.maker.token,
+        token.creator.user,
+        token.creator.token,
         Instant(token.created_at),
         token.expires_at.map(Instant),
     )
@@ -418,13 +421,13 @@ pub(crate) async fn set_hash(
     connection: &mut SqliteConnection,
     id: TokenId,
     hash: [u8; 32],
-    maker: Maker,
+    creator: Creator,
 ) -> Result<()> {
     sqlx::query!(
         "UPDATE tokens SET hash = ?, made_by = ?, made_with = ?, last_used_at = NULL WHERE id = ?",
         Bytes32(hash),
-        maker.user,
-        maker.token,
+        creator.user,
+        creator.token,
         id
     )
     .execute(connection)

@@ -3,7 +3,7 @@
 use crate::{
     column::Instant,
     error::{Result, StoreError},
-    tables::tokens::Maker,
+    tables::tokens::Creator,
 };
 use faceoff_types::{TeamId, UserId, UserName, name_skeleton};
 use jiff::Timestamp;
@@ -110,15 +110,15 @@ pub(crate) async fn find_with_password(
 /// access again by them. By name; also those who have left.
 pub(crate) async fn invited(
     connection: &mut SqliteConnection,
-    maker: Maker,
+    creator: Creator,
     restored: bool,
 ) -> Result<Vec<User>> {
     let rows = select_users!(
         "WHERE id IN (SELECT accepted_by FROM invitations
                       WHERE (made_by = ? OR made_with = ?) AND (role = 'return') = ?)
          ORDER BY name",
-        maker.user,
-        maker.token,
+        creator.user,
+        creator.token,
         restored
     )
     .fetch_all(connection)

@@ -3,7 +3,7 @@
 use crate::{
     column::{Bytes32, Instant, Json},
     error::{Result, StoreError},
-    tables::tokens::Maker,
+    tables::tokens::Creator,
 };
 use faceoff_types::{TeamId, TokenId, UserId, WebhookId};
 use jiff::Timestamp;
@@ -21,7 +21,7 @@ pub struct Webhook {
     /// Topics of the events that are sent; empty: all events that its owner may see.
     pub topics: Vec<String>,
     /// Who created it or chose its current address.
-    pub maker: Maker,
+    pub creator: Creator,
     pub created_at: Timestamp,
     /// Deliveries exist for all events up to this id.
     pub seen: i64,
@@ -81,7 +81,7 @@ impl From<WebhookRow> for Webhook {
             name: row.name,
             url: row.url,
             topics: row.about.0,
-            maker: Maker {
+            creator: Creator {
                 user: row.made_by,
                 token: row.made_with,
             },
@@ -143,14 +143,14 @@ pub(crate) async fn with_new_events(
 }
 
 /// The enabled webhooks that this user has made, or that were made with this token.
-pub(crate) async fn enabled_made(
+pub(crate) async fn enabled_created_by(
     connection: &mut SqliteConnection,
-    maker: Maker,
+    creator: Creator,
 ) -> Result<Vec<Webhook>> {
     let rows = select_webhooks!(
         "WHERE (made_by = ? OR made_with = ?) AND dead_at IS NULL ORDER BY created_at, id",
-        maker.user,
-        maker.token
+        creator.user,
+        creator.token
     )
     .fetch_all(connection)
     .await?;
@@ -180,8 +180,8 @@ pub(crate) async fn insert(
         webhook.url,
         Json(&webhook.topics),
         Bytes32(secret),
-        webhook.maker.user,
-        webhook.maker.token,
+        webhook.creator.user,
+        webhook.creator.token,
         Instant(webhook.created_at),
         webhook.seen,
     )
@@ -202,8 +202,8 @@ pub(crate) async fn update(connection: &mut SqliteConnection, webhook: &Webhook)
         webhook.name,
         webhook.url,
         Json(&webhook.topics),
-        webhook.maker.user,
-        webhook.maker.token,
+        webhook.creator.user,
+        webhook.creator.token,
         webhook.seen,
         webhook.failing_since.map(Instant),
         dead_at,

@@ -3,7 +3,7 @@
 
 use crate::fixture::*;
 use faceoff_store::*;
-use faceoff_types::{SubmissionId, ValidationOutcome, Zone};
+use faceoff_types::{IanaTimeZone, SubmissionId, ValidationOutcome};
 use jiff::civil::date;
 
 /// The day of the error that a day's cutoff has passed already.
@@ -370,7 +370,7 @@ async fn empty_plan_is_refused() {
         let (rules, settings) = rules_and_settings(&plan);
         let error = f
             .store
-            .configure_stage(rules, settings, Zone::UTC, f.now)
+            .configure_stage(rules, settings, IanaTimeZone::UTC, f.now)
             .await
             .unwrap_err();
         assert!(matches!(error, StoreError::Conflict(_)), "{error}");

@@ -16,7 +16,7 @@ async fn configure_daily_stage(f: &TestStore, day_deadline: DayDeadline) -> Stag
     };
     let configured = f
         .store
-        .configure_stage(rules, settings, Zone::UTC, f.now)
+        .configure_stage(rules, settings, IanaTimeZone::UTC, f.now)
         .await;
     configured.unwrap();
     f.store.stages().await.unwrap()[0].id

@@ -152,7 +152,7 @@ impl TestStore {
             Ok(_) | Err(StoreError::CutoffPassed { .. }) => {}
             Err(error) => panic!("{error}"),
         }
-        let today = Zone::UTC.date(self.now);
+        let today = IanaTimeZone::UTC.date(self.now);
         let evaluations = self.store.evaluations_on(today).await.unwrap();
         let found = evaluations
             .into_iter()

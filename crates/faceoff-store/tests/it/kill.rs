@@ -347,7 +347,7 @@ async fn sign_off(store: &Store, name: &str, now: jiff::Timestamp, report: &impl
         name: name.parse().unwrap(),
         opens_at: now,
         closes_at: Some(now + hour),
-        zone: Zone::UTC,
+        zone: IanaTimeZone::UTC,
         rules,
         settings,
     };

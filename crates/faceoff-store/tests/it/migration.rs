@@ -641,7 +641,7 @@ async fn migration_creates_first_stage_with_revisions() {
     // The configuration of before, but with the ruleset of the new program, which is a new revision.
     let (rules, settings) = rules_and_settings(&six_shard_plan());
     let now = "2026-03-01T08:30:00Z".parse().unwrap();
-    let configured = store.configure_stage(rules.clone(), settings, Zone::UTC, now);
+    let configured = store.configure_stage(rules.clone(), settings, IanaTimeZone::UTC, now);
     configured.await.unwrap();
     let stage = store.stages().await.unwrap().remove(0);
     assert_eq!((stage.rules.number, stage.rules.rules), (3, rules));

@@ -174,7 +174,7 @@ async fn season_belongs_to_one_competition() {
         ends: Vec::new(),
         violations: Vec::new(),
         actions: ActionSpace {
-            is_stated: false,
+            agents_choose_layout: false,
             layouts: Vec::new(),
         },
         recording: RecordingColumns::default(),

@@ -314,7 +314,7 @@ async fn retention_keeps_datasets_of_blind_stage() {
         ..settings
     };
     f.store
-        .configure_stage(rules, blind.clone(), Zone::UTC, f.now)
+        .configure_stage(rules, blind.clone(), IanaTimeZone::UTC, f.now)
         .await
         .unwrap();
     let stage = first_stage(&f).await;

@@ -15,7 +15,7 @@ async fn create_stage(f: &TestStore, settings: StageSettings) -> Stage {
         name: "Warm-up".parse().unwrap(),
         opens_at: f.now,
         closes_at: Some(time(CLOSES_AT)),
-        zone: Zone::UTC,
+        zone: IanaTimeZone::UTC,
         rules,
         settings: StageSettings {
             episodes_per_shard: plan_settings.episodes_per_shard,
@@ -308,7 +308,7 @@ async fn final_day_needs_its_own_date_and_a_submission() {
         name: "Last".parse().unwrap(),
         opens_at: f.now,
         closes_at: Some(time(CLOSES_AT)),
-        zone: Zone::UTC,
+        zone: IanaTimeZone::UTC,
         rules,
         settings: StageSettings {
             standings: CountingResult::Final,

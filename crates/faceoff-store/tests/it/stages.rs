@@ -12,7 +12,7 @@ fn warm_up_stage() -> NewStage {
         name: "Warm-up".parse().unwrap(),
         opens_at: time("2026-03-01T10:00:00Z"),
         closes_at: Some(time("2026-03-03T10:00:00Z")),
-        zone: Zone::UTC,
+        zone: IanaTimeZone::UTC,
         rules,
         settings,
     }
@@ -254,7 +254,9 @@ async fn first_stage_follows_configuration_until_changed() {
     let mut f = TestStore::new().await;
     let configure = async |f: &TestStore, plan: &RunPlan| {
         let (rules, settings) = rules_and_settings(plan);
-        let configured = f.store.configure_stage(rules, settings, Zone::UTC, f.now);
+        let configured = f
+            .store
+            .configure_stage(rules, settings, IanaTimeZone::UTC, f.now);
         configured.await.unwrap();
         f.store.stages().await.unwrap()
     };

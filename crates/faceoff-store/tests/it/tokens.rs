@@ -270,22 +270,22 @@ async fn makers_of_earlier_versions_come_from_the_log() {
     execute(&format!("UPDATE{updates}")).await;
 
     let tokens = all_tokens(&f).await;
-    let maker = |id| {
+    let creator = |id| {
         let token = tokens.iter().find(|token| token.id == id);
-        token.unwrap().maker.user
+        token.unwrap().creator.user
     };
-    assert_eq!(maker(by_first), Some(first));
-    assert_eq!(maker(rotated_by_second), Some(second));
-    assert_eq!(maker(rotated_by_team), Some(first));
-    assert_eq!(maker(by_host), None);
+    assert_eq!(creator(by_first), Some(first));
+    assert_eq!(creator(rotated_by_second), Some(second));
+    assert_eq!(creator(rotated_by_team), Some(first));
+    assert_eq!(creator(by_host), None);
     let own = tokens
         .iter()
         .filter(|token| token.owner == TokenOwner::User(first));
-    assert!(own.clone().count() == 1 && own.clone().all(|token| token.maker.user == Some(first)));
+    assert!(own.clone().count() == 1 && own.clone().all(|token| token.creator.user == Some(first)));
     let invitations = all_invitations(&f).await;
     let link = invitations.iter().find(|found| found.id == link.id);
     let link = link.unwrap();
-    assert_eq!(link.maker.user, Some(second));
+    assert_eq!(link.creator.user, Some(second));
     assert_eq!(link.expires_at, f.now + SignedDuration::from_hours(24));
 }
 

@@ -496,7 +496,7 @@ fn ready_to_reset_must_name_the_episode() {
 #[test]
 fn only_layout_need_not_be_stated() {
     let single = ActionSpace {
-        is_stated: false,
+        agents_choose_layout: false,
         layouts: vec![ActionLayout::new(None, &[2])],
     };
     let ready = parse_ready(br#"{"type":"ready","protocol":1}"#, &single).unwrap();

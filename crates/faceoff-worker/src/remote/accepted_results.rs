@@ -132,7 +132,7 @@ impl Dispatcher {
                 tracing::warn!(job = %lease.job_id, slot = lease.slot, "NATS has lost a result: the job is queued again");
                 let server = self.server.clone();
                 let released = tokio::task::spawn_blocking(move || {
-                    server.release(&lease, ReleaseReason::Shutdown)
+                    server.release(&lease, ReleaseReason::Interrupted)
                 });
                 released.await??;
             }
@@ -197,7 +197,7 @@ impl Dispatcher {
             && matches!(result.end, JobEnd::Done { .. })
         {
             tracing::info!(job = %id, %worker, "the result is from another program version: the job is queued again");
-            result.end = JobEnd::Shutdown;
+            result.end = JobEnd::Interrupted;
         }
         if let JobEnd::PlatformFault { reason } = &mut result.end {
             *reason = printable_excerpt(reason, MAX_REASON_CHARS);
@@ -213,7 +213,7 @@ impl Dispatcher {
         let _processing = self.pending_results.start_processing(nonce);
         let acknowledgement = match self.check_within_limit(message, grant, result).await {
             // A repeated result has no effect.
-            Ok(Acceptance::Accepted | Acceptance::Unusable) if is_job_over => {
+            Ok(Acceptance::Accepted | Acceptance::JobMismatch) if is_job_over => {
                 tracing::info!(job = %id, %worker, "the job is over already; result ignored");
                 AckKind::Ack
             }
@@ -228,7 +228,7 @@ impl Dispatcher {
                 tracing::info!(job = %id, %worker, "result accepted");
                 AckKind::Ack
             }
-            Ok(Acceptance::Unusable) => {
+            Ok(Acceptance::JobMismatch) => {
                 workers.end_job(id);
                 record_failure();
                 tracing::info!(job = %id, %worker, "result not acceptable: the job is queued again");
@@ -238,7 +238,7 @@ impl Dispatcher {
                 tracing::info!(job = %id, %worker, "lease lost; result ignored");
                 AckKind::Ack
             }
-            Ok(Acceptance::Rejected(difference)) => {
+            Ok(Acceptance::SimulationMismatch(difference)) => {
                 // It may quote the recording.
                 let difference = printable_excerpt(&difference, MAX_REASON_CHARS);
                 let reason = format!("its recording differs from the simulation: {difference}");

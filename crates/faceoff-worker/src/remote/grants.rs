@@ -67,10 +67,10 @@ pub(super) enum Acceptance {
     Accepted,
     /// The worker does not have the lease.
     LeaseLost,
-    /// The result does not match its job; the job is released as after a platform fault.
-    Unusable,
-    /// The result differs from what the simulator computes; the text is for organisers.
-    Rejected(String),
+    /// The result has another form than its job demands, e.g. other episodes; the job is released as after a platform fault.
+    JobMismatch,
+    /// The recording differs from what the simulator computes for the recorded actions. The text, for organisers, names the difference.
+    SimulationMismatch(String),
     /// Some of the result's files are still being uploaded.
     FilesPending,
     /// The result was not checked, since too many earlier checks of it did not end.
@@ -104,7 +104,7 @@ pub(super) fn store_result(
     let ResultMessage { lease, end, .. } = message;
     let released = match end {
         JobEnd::Done { report } => return store_report(server, checks, grant, &lease, *report),
-        JobEnd::Shutdown => server.release(&lease, ReleaseReason::Shutdown),
+        JobEnd::Interrupted => server.release(&lease, ReleaseReason::Interrupted),
         JobEnd::FullDisk => server.release(&lease, ReleaseReason::FullDisk),
         JobEnd::PlatformFault { reason } => {
             server.release(&lease, ReleaseReason::PlatformFault(&reason))
@@ -124,7 +124,7 @@ fn store_report(
         tracing::error!(job = %lease.job_id, slot = lease.slot, "a worker's report does not match its job");
         let reason = ReleaseReason::PlatformFault("a worker's report did not match its job");
         server.release(lease, reason)?;
-        return Ok(Acceptance::Unusable);
+        return Ok(Acceptance::JobMismatch);
     }
     // If the lease is over, the result is already stored or will be refused. It is not checked, since its files may be gone.
     if server.is_held(lease)? {
@@ -134,7 +134,7 @@ fn store_report(
         if let Some(difference) =
             checks.find_difference(grant, &report, server.store.artifacts())?
         {
-            return Ok(Acceptance::Rejected(difference));
+            return Ok(Acceptance::SimulationMismatch(difference));
         }
     }
     match server.commit(lease, report) {
@@ -144,7 +144,7 @@ fn store_report(
             tracing::error!(job = %lease.job_id, slot = lease.slot, %error, "a worker's report is not acceptable");
             let reason = "a worker's report does not match its job";
             server.release(lease, ReleaseReason::PlatformFault(reason))?;
-            Ok(Acceptance::Unusable)
+            Ok(Acceptance::JobMismatch)
         }
         Err(error) => Err(error),
     }

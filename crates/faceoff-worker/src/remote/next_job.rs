@@ -164,7 +164,7 @@ impl ServerClient {
             };
         }
         tracing::warn!(job = %id, cause, "no response to the start of a job: it is released");
-        let sent = self.send_result(lease, &job.grant, JobEnd::Shutdown);
+        let sent = self.send_result(lease, &job.grant, JobEnd::Interrupted);
         let sent = tokio::time::timeout(REQUEST_TIMEOUT, sent).await;
         if let Err(error) = sent.map_err(anyhow::Error::from).flatten() {
             tracing::warn!(job = %id, cause = format!("{error:#}"), "the job could not be released; its lease will expire");

@@ -231,7 +231,7 @@ impl JobServer for ServerClient {
 
     fn release(&self, lease: &Lease, reason: ReleaseReason<'_>) -> anyhow::Result<()> {
         let end = match reason {
-            ReleaseReason::Shutdown => JobEnd::Shutdown,
+            ReleaseReason::Interrupted => JobEnd::Interrupted,
             ReleaseReason::FullDisk => {
                 let mut disk_full_at = self
                     .disk_full_at

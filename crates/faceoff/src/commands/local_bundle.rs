@@ -53,8 +53,9 @@ pub(super) fn open(
     Ok(bundle)
 }
 
-/// Gives up the layers of the sandbox that this user cannot get on this host: developers run their own agents, which they could also
-/// run without a sandbox. First the command starts again in a scope of systemd, if that gives the user control groups. Returns the note that says which layers are missing, if any are.
+/// Gives up the layers of the sandbox that this user cannot get on this host: developers run their own agents, which they could also run
+/// without a sandbox. First the command starts again in a scope of systemd, if that gives the user control groups. Returns the note that
+/// says which layers are missing, if any are.
 ///
 /// # Errors
 /// If a bundle is an archive, which may be another team's, and a layer is missing that keeps agents from the user's files and the

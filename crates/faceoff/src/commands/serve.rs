@@ -11,9 +11,9 @@ mod live_season;
 mod monitoring;
 mod priority;
 mod remote;
+mod resources;
 mod runtime_inventory;
 mod sandbox;
-mod site;
 mod tasks;
 
 pub use data_folder::{ADMIN_TOKEN_FILE, lock};

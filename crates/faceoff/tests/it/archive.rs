@@ -14,7 +14,9 @@ use faceoff_testkit::{
     bundle_ref, create_team, new_store, one_shard_plan, outcome, rules_and_settings, shard_commit,
     shard_outcomes, submit, valid_outcome,
 };
-use faceoff_types::{Clock, EvaluationId, EvaluationResult, StageSettings, TimeLimits, Zone};
+use faceoff_types::{
+    Clock, EvaluationId, EvaluationResult, IanaTimeZone, StageSettings, TimeLimits,
+};
 use jiff::Timestamp;
 use serde_json::Value;
 use std::{
@@ -85,7 +87,7 @@ async fn start_site() -> Site {
         ..settings
     };
     store
-        .configure_stage(rules, settings, Zone::UTC, now())
+        .configure_stage(rules, settings, IanaTimeZone::UTC, now())
         .await
         .unwrap();
     let evaluation = run_day(&store).await;

@@ -133,7 +133,7 @@ impl World for NoisyWorld {
         columns.put(&self.numbers[OBSERVED..][..STATE]);
         columns.put_absent(OPPONENT);
     }
-    fn limits(&self) -> &[f64] {
+    fn constraint_values(&self) -> &[f64] {
         &self.numbers[OBSERVED + STATE..]
     }
     fn as_any(&self) -> &dyn Any {

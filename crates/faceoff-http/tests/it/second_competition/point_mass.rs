@@ -39,7 +39,7 @@ impl PointMass {
             title: profile.to_string(),
             description: description.to_owned(),
             letter,
-            is_ablated: true,
+            is_in_ablations: true,
         };
         let end = |end, title: &str| EndInfo {
             end,
@@ -91,7 +91,7 @@ impl PointMass {
                     bounds: [0.0, 1.0],
                 }],
                 actions: ActionSpace {
-                    is_stated: false,
+                    agents_choose_layout: false,
                     layouts: vec![ActionLayout::new(None, &[1])],
                 },
                 recording: RecordingColumns {
@@ -228,7 +228,7 @@ impl World for Mass {
         columns.put(&self.state);
     }
 
-    fn limits(&self) -> &[f64] {
+    fn constraint_values(&self) -> &[f64] {
         &self.excess
     }
 

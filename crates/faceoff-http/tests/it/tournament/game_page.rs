@@ -6,7 +6,7 @@ use crate::{
     site::string,
 };
 use faceoff_airhockey::Interpolation;
-use faceoff_airhockey::{Arena, RallyEntry, Response, RunningGame};
+use faceoff_airhockey::{RallyEntry, Response, RunningGame, SimulationSetup};
 use faceoff_episode::AnswerTiming;
 use faceoff_replay::{CHUNK_STEPS, Clip, GameClipRecorder};
 use faceoff_store::Game;
@@ -19,13 +19,13 @@ const STEPS: u32 = 600;
 /// The clip file of a short game in which both arms do not move.
 fn record_game_clips() -> Vec<u8> {
     let seed = Seed::from_number(5);
-    let arena = Arena::new(
+    let setup = SimulationSetup::new(
         faceoff_airhockey::IDEAL.try_into().unwrap(),
         seed,
         seed.model_mismatch(),
     );
     let clips = GameClipRecorder::new(Vec::new()).unwrap();
-    let mut running = RunningGame::begin(&arena, STEPS, GameLimits::default(), clips);
+    let mut running = RunningGame::begin(&setup, STEPS, GameLimits::default(), clips);
     while running.end().is_none() {
         let entries = Side::BOTH.map(|side| RallyEntry::Ready {
             startup_s: running.needs_start(side).then_some(0.1),

@@ -14,8 +14,8 @@ pub(in crate::organiser) struct Input {
     /// That of the setting in the API, if it is the setting's only input.
     pub(in crate::organiser) name: &'static str,
     pub(in crate::organiser) label: &'static str,
-    /// Unit or format; empty if the label says enough.
-    pub(in crate::organiser) note: &'static str,
+    /// A hint beside the label: unit or format; empty if the label says enough.
+    pub(in crate::organiser) hint: &'static str,
     pub(in crate::organiser) kind: InputKind,
     /// The text for a stage.
     pub(super) text: fn(&Stage) -> String,
@@ -30,9 +30,9 @@ pub(in crate::organiser) enum InputKind {
     DateTime,
     /// A whole number from this one on.
     Number(u32),
-    /// A profile of the competition.
-    Profile,
-    /// Values with their labels.
+    /// A choice among the profiles of the competition.
+    ProfileChoice,
+    /// A choice among values, which have labels.
     Choice(fn() -> Vec<(&'static str, &'static str)>),
     Checkbox,
 }
@@ -41,7 +41,7 @@ pub(in crate::organiser) enum InputKind {
 pub(in crate::organiser) struct InputGroup {
     /// Empty: without a border.
     pub(in crate::organiser) legend: &'static str,
-    pub(in crate::organiser) note: &'static str,
+    pub(in crate::organiser) hint: &'static str,
     pub(super) inputs: &'static [Input],
     /// Followed by a checkbox for each task.
     pub(in crate::organiser) has_tasks: bool,
@@ -64,7 +64,7 @@ impl InputGroup {
 pub(super) static NAME: Input = Input {
     name: "name",
     label: "Name",
-    note: "",
+    hint: "",
     kind: InputKind::Text,
     text: |stage| stage.name.to_string(),
     read: |form, patch| {
@@ -76,13 +76,13 @@ pub(super) static NAME: Input = Input {
 pub(super) static GROUPS: [InputGroup; 4] = [
     InputGroup {
         legend: "",
-        note: "",
+        hint: "",
         has_tasks: false,
         inputs: &[
             Input {
                 name: "opens_at",
                 label: "Opens",
-                note: "UTC",
+                hint: "UTC",
                 kind: InputKind::DateTime,
                 text: |stage| datetime_local(stage.opens_at),
                 read: |form, patch| {
@@ -93,7 +93,7 @@ pub(super) static GROUPS: [InputGroup; 4] = [
             Input {
                 name: "closes_at",
                 label: "Closes",
-                note: "UTC; empty: no date set",
+                hint: "UTC; empty: no date set",
                 kind: InputKind::DateTime,
                 text: |stage| stage.closes_at.map(datetime_local).unwrap_or_default(),
                 read: |form, patch| {
@@ -104,7 +104,7 @@ pub(super) static GROUPS: [InputGroup; 4] = [
             Input {
                 name: "zone",
                 label: "Time zone",
-                note: "",
+                hint: "",
                 kind: InputKind::Text,
                 text: |stage| stage.zone.to_string(),
                 read: |form, patch| parse(form, "zone", &mut patch.zone),
@@ -113,13 +113,13 @@ pub(super) static GROUPS: [InputGroup; 4] = [
     },
     InputGroup {
         legend: "Daily cutoff",
-        note: "",
+        hint: "",
         has_tasks: false,
         inputs: &[
             Input {
                 name: "schedule",
                 label: "Time or cron expression",
-                note: "06:00 or 0 6 * * 1-5; empty: an organiser starts each day",
+                hint: "06:00 or 0 6 * * 1-5; empty: an organiser starts each day",
                 kind: InputKind::OptionalText,
                 text: time_or_cron,
                 read: read_schedule,
@@ -127,7 +127,7 @@ pub(super) static GROUPS: [InputGroup; 4] = [
             Input {
                 name: "days_off",
                 label: "Dates without evaluation",
-                note: "2026-12-24 2026-12-25",
+                hint: "2026-12-24 2026-12-25",
                 kind: InputKind::OptionalText,
                 text: days_off,
                 read: read_schedule,
@@ -135,7 +135,7 @@ pub(super) static GROUPS: [InputGroup; 4] = [
             Input {
                 name: "day_deadline",
                 label: "Deadline of a day",
-                note: "next-cut: the next daily cutoff; never; or hours such as 30h",
+                hint: "next-cut: the next daily cutoff; never; or hours such as 30h",
                 kind: InputKind::Text,
                 text: |stage| stage.settings.day_deadline.to_string(),
                 read: |form, patch| parse(form, "day_deadline", &mut patch.day_deadline),
@@ -144,21 +144,21 @@ pub(super) static GROUPS: [InputGroup; 4] = [
     },
     InputGroup {
         legend: "Rules",
-        note: "new rules start a new revision with its own board",
+        hint: "new rules start a new revision with its own board",
         has_tasks: true,
         inputs: &[
             Input {
                 name: "profile",
                 label: "Perturbations",
-                note: "",
-                kind: InputKind::Profile,
+                hint: "",
+                kind: InputKind::ProfileChoice,
                 text: |stage| stage.rules.rules.profile.to_string(),
                 read: |form, patch| parse(form, "profile", &mut patch.profile),
             },
             Input {
                 name: "episodes_per_task",
                 label: "Episodes per task",
-                note: "",
+                hint: "",
                 kind: InputKind::Number(1),
                 text: |stage| stage.rules.rules.episodes_per_task.to_string(),
                 read: |form, patch| {
@@ -168,7 +168,7 @@ pub(super) static GROUPS: [InputGroup; 4] = [
             Input {
                 name: "max_faults",
                 label: "Faults allowed",
-                note: "",
+                hint: "",
                 kind: InputKind::Number(0),
                 text: |stage| stage.rules.rules.max_faults.to_string(),
                 read: |form, patch| parse_number(form, "max_faults", &mut patch.max_faults),
@@ -177,13 +177,13 @@ pub(super) static GROUPS: [InputGroup; 4] = [
     },
     InputGroup {
         legend: "Boards and files",
-        note: "",
+        hint: "",
         has_tasks: false,
         inputs: &[
             Input {
                 name: "standings",
                 label: "Which result counts",
-                note: "latest: the newest; best: the highest ranked; final: that of a final day after the stage has closed; \
+                hint: "latest: the newest; best: the highest ranked; final: that of a final day after the stage has closed; \
 mean_of_last:5: the mean of the last 5 days",
                 kind: InputKind::Text,
                 text: |stage| stage.settings.standings.to_string(),
@@ -192,7 +192,7 @@ mean_of_last:5: the mean of the last 5 days",
             Input {
                 name: "publishes",
                 label: "Datasets become public",
-                note: "",
+                hint: "",
                 kind: InputKind::Choice(publications),
                 text: |stage| stage.settings.publishes.to_string(),
                 read: |form, patch| parse(form, "publishes", &mut patch.publishes),
@@ -200,7 +200,7 @@ mean_of_last:5: the mean of the last 5 days",
             Input {
                 name: "ablation_episodes",
                 label: "Ablation episodes",
-                note: "per task and profile; 0: none",
+                hint: "per task and profile; 0: none",
                 kind: InputKind::Number(0),
                 text: |stage| stage.settings.ablation_episodes.to_string(),
                 read: |form, patch| {
@@ -210,7 +210,7 @@ mean_of_last:5: the mean of the last 5 days",
             Input {
                 name: "blind",
                 label: "Blind: only organisers see scores",
-                note: "",
+                hint: "",
                 kind: InputKind::Checkbox,
                 text: |stage| checkbox_text(stage.settings.blind),
                 read: |form, patch| {

@@ -6,7 +6,7 @@ use super::{
     fuzz,
 };
 use faceoff_airhockey::EVALUATION;
-use faceoff_airhockey::{Arena, RallyEntry, Response, RunningGame, SideFault};
+use faceoff_airhockey::{RallyEntry, Response, RunningGame, SideFault, SimulationSetup};
 use faceoff_dataset::{
     game::{GAME_FILE, GameRecorder, GameRecording, RecordedGame, verify_game},
     verify::VerifyError,
@@ -32,13 +32,13 @@ fn record_game(out: &Path) {
         perturbations: Default::default(),
         forfeit_score: Default::default(),
     };
-    let arena = Arena::new(
+    let setup = SimulationSetup::new(
         spec.profile.try_into().unwrap(),
         spec.seed,
         spec.mismatch_seed,
     );
     let recorder = GameRecorder::create(&out.join("tables")).unwrap();
-    let mut game = RunningGame::begin(&arena, spec.steps, spec.limits.clone(), recorder);
+    let mut game = RunningGame::begin(&setup, spec.steps, spec.limits.clone(), recorder);
     while game.end().is_none() {
         let entries = Side::BOTH.map(|side| RallyEntry::Ready {
             startup_s: game.needs_start(side).then_some(0.25),

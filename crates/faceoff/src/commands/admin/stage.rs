@@ -18,7 +18,7 @@ use faceoff_api::{
         stage::{PhaseView, StageView},
     },
 };
-use faceoff_types::{Publication, Task, TaskWeights, Zone};
+use faceoff_types::{IanaTimeZone, Publication, Task, TaskWeights};
 use jiff::{Timestamp, Zoned, civil::DateTime};
 
 #[derive(Debug, Subcommand)]
@@ -97,7 +97,7 @@ pub(super) struct StageOptions {
 
 impl StageOptions {
     /// The settings, with times that are local in the option `--zone`, or else in `zone`.
-    fn settings(self, zone: &Zone) -> anyhow::Result<StagePatch> {
+    fn settings(self, zone: &IanaTimeZone) -> anyhow::Result<StagePatch> {
         let zone = self.settings.zone.as_ref().unwrap_or(zone);
         let parse = |text: Option<String>| {
             let time = text.map(|text| parse_time(&text, zone));
@@ -114,7 +114,7 @@ impl StageOptions {
 }
 
 /// Parses a time with an offset or a zone; without them, it is local time in `zone`.
-fn parse_time(text: &str, zone: &Zone) -> anyhow::Result<Timestamp> {
+fn parse_time(text: &str, zone: &IanaTimeZone) -> anyhow::Result<Timestamp> {
     if let Ok(time) = text.parse::<Timestamp>() {
         return Ok(time);
     }
@@ -200,11 +200,11 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
 }
 
 /// The time zone of the open stage, or else of the last one.
-async fn default_zone(client: &Client) -> anyhow::Result<Zone> {
+async fn default_zone(client: &Client) -> anyhow::Result<IanaTimeZone> {
     let stages = client.stages().await?;
     let open = stages.iter().rfind(|stage| stage.phase == PhaseView::Open);
     let template = open.or(stages.last());
-    Ok(template.map_or(Zone::UTC, |stage| stage.zone.clone()))
+    Ok(template.map_or(IanaTimeZone::UTC, |stage| stage.zone.clone()))
 }
 
 /// Warnings about evaluation days that do not fit into their time.
@@ -310,7 +310,7 @@ mod tests {
 
     #[test]
     fn time_without_offset_is_in_the_zone_of_the_stage() {
-        let berlin: Zone = "Europe/Berlin".parse().unwrap();
+        let berlin: IanaTimeZone = "Europe/Berlin".parse().unwrap();
         let parse = |text: &str| parse_time(text, &berlin).map(|time| time.to_string());
         for text in [
             "2026-12-01 06:00",

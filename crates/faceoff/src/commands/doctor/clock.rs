@@ -1,7 +1,7 @@
 //! Checks of the clock and the time zone that determine *cutoffs*, the times at which evaluation days start.
 
 use super::check::Check;
-use faceoff_types::Zone;
+use faceoff_types::IanaTimeZone;
 use jiff::{SignedDuration, Timestamp};
 use std::{
     path::Path,
@@ -63,7 +63,7 @@ fn is_synchronised() -> Option<bool> {
 }
 
 /// Reports the time zone of a new season's evaluation days.
-pub fn zone(zone: &Zone, now: Timestamp) -> Check {
+pub fn zone(zone: &IanaTimeZone, now: Timestamp) -> Check {
     let local = now.to_zoned(zone.time_zone());
     Check {
         name: "time zone",

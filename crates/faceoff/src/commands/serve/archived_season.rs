@@ -2,7 +2,7 @@
 
 use super::{
     http::{serve_http, shutdown_signal},
-    site::{Site, announce},
+    resources::{ServerResources, announce},
 };
 use crate::competition::competition;
 use crate::config::Config;
@@ -23,8 +23,8 @@ pub async fn serve(
     archived: ArchivedSeason,
 ) -> anyhow::Result<()> {
     let data_dir = &config.server.data_dir;
-    let site = Site::open(&config, vec![data_dir.clone()]).await?;
-    let (store, address) = (site.store.clone(), site.address);
+    let resources = ServerResources::open(&config, vec![data_dir.clone()]).await?;
+    let (store, address) = (resources.store.clone(), resources.address);
     let made_at = archived.made_at;
     let capacity = Capacity {
         longest_episode_s: competition().longest_episode_s(),
@@ -32,7 +32,7 @@ pub async fn serve(
         runtimes: Vec::new(),
         time: config.time.clone(),
     };
-    let http_config = site.http_config(
+    let http_config = resources.http_config(
         &config,
         Clock::new(move || made_at),
         capacity,
@@ -52,7 +52,7 @@ pub async fn serve(
     let shutdown = CancellationToken::new();
     let signal = shutdown_signal()?;
     let mut server = tokio::spawn(serve_http(
-        site.listener,
+        resources.listener,
         router,
         connections,
         shutdown.clone(),

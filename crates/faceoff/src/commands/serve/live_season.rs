@@ -5,9 +5,10 @@ use super::{
     http::serve_http,
     monitoring,
     priority::low_priority_runtime,
-    remote, runtime_inventory,
+    remote,
+    resources::{ServerResources, announce},
+    runtime_inventory,
     sandbox::hold_in_memory,
-    site::{Site, announce},
     tasks::ServerTasks,
 };
 use crate::competition::competition;
@@ -68,9 +69,10 @@ async fn serve(
     create_private(&data_dir)?;
     let scratch_dir = config.scratch_dir();
     create_private(&scratch_dir)?;
-    let site = Site::open(&config, vec![data_dir.clone(), scratch_dir.clone()]).await?;
-    let (store, address) = (site.store.clone(), site.address);
-    let clock = site.clock.clone();
+    let resources =
+        ServerResources::open(&config, vec![data_dir.clone(), scratch_dir.clone()]).await?;
+    let (store, address) = (resources.store.clone(), resources.address);
+    let clock = resources.clock.clone();
     log_upgrade(&store);
     shorten_due_times(&config, &store, clock.now()).await?;
     configure_season(&config, &store, clock.now()).await?;
@@ -84,8 +86,9 @@ async fn serve(
         clock.clone(),
         capacity.clone(),
     );
-    let remote = remote::remote_config(&config, address, &site.link_key, &agent)?;
-    let http_config = site.http_config(&config, clock.clone(), capacity, slots.agent_resources);
+    let remote = remote::remote_config(&config, address, &resources.link_key, &agent)?;
+    let http_config =
+        resources.http_config(&config, clock.clone(), capacity, slots.agent_resources);
     let metrics = http_config.metrics.clone();
     let metrics_listener = match config.server.metrics_listen {
         Some(address) => Some(monitoring::listen(address).await?),
@@ -154,7 +157,7 @@ async fn serve(
     }
     let webhooks_enabled = config.webhooks.enabled;
     tasks.spawn(move |shutdown| deliver_webhooks(deliverer, webhooks_enabled, shutdown));
-    tasks.spawn(|shutdown| serve_http(site.listener, router, connections, shutdown));
+    tasks.spawn(|shutdown| serve_http(resources.listener, router, connections, shutdown));
     announce(address);
     tasks.run_until_signal(&store).await
 }

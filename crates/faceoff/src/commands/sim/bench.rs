@@ -3,7 +3,7 @@
 
 use anyhow::{Result, ensure};
 use clap::{Args, ValueEnum};
-use faceoff_airhockey::Arena;
+use faceoff_airhockey::SimulationSetup;
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
     AirHockeyProfile, Command, Game, GameSetup, Interpolation, PerturbationSettings, Plant,
@@ -118,13 +118,13 @@ impl BenchArgs {
 
     /// Runs the episodes of a task; returns the number of control steps and the time they took.
     fn play_episodes(&self, task: AirHockeyTask) -> (u64, Duration) {
-        let arena = Arena::new(self.profile, self.seed, self.seed.model_mismatch());
+        let setup = SimulationSetup::new(self.profile, self.seed, self.seed.model_mismatch());
         let action = HOLD_INTERPOLATION.hold_position(&INITIAL_Q);
         let action = &action[..HOLD_INTERPOLATION.len()];
         let (mut steps, mut time) = (0, Duration::ZERO);
         for index in 0..self.episodes {
             let start = Instant::now();
-            let mut episode = arena.episode(task, index, HOLD_INTERPOLATION);
+            let mut episode = setup.episode(task, index, HOLD_INTERPOLATION);
             while episode.step(black_box(action)).end.is_none() {
                 black_box(episode.observation());
             }

@@ -146,7 +146,7 @@ fn evaluate(q: &[f64; DOFS], dq: &[f64; DOFS]) -> PoseModel {
     let ee = kinematics.end_effector.origin;
     let mut jacobian = [[0.0; JOINTS]; 6];
     for (joint, axis) in kinematics.axes.iter().take(JOINTS).enumerate() {
-        let (linear, angular) = (axis.velocity_at(ee).lane(0), axis.angular.lane(0));
+        let (linear, angular) = (axis.velocity_at(ee).to_array(), axis.angular.to_array());
         for row in 0..3 {
             jacobian[row][joint] = linear[row];
             jacobian[row + 3][joint] = angular[row];
@@ -175,9 +175,9 @@ fn evaluate(q: &[f64; DOFS], dq: &[f64; DOFS]) -> PoseModel {
     let positions: [f64; JOINTS] = std::array::from_fn(|i| q[i]);
     let constraints = ConstraintValues::new(&positions, &driven, &kinematics);
     PoseModel {
-        links: kinematics.links.map(|link| link.origin.lane(0)),
+        links: kinematics.links.map(|link| link.origin.to_array()),
         rotations: kinematics.links.map(|link| link.rotation(0)),
-        ee: ee.lane(0),
+        ee: ee.to_array(),
         jacobian,
         mass,
         bias: torques(&driven, &zero),
@@ -185,8 +185,8 @@ fn evaluate(q: &[f64; DOFS], dq: &[f64; DOFS]) -> PoseModel {
         constraints: constraints.into(),
         plant: Plant {
             q: *q,
-            mallet: kinematics.cylinder_centre().lane(0),
-            mallet_axis: kinematics.mallet_axis.lane(0),
+            mallet: kinematics.cylinder_centre().to_array(),
+            mallet_axis: kinematics.mallet_axis.to_array(),
             mass: std::array::from_fn(|i| {
                 std::array::from_fn(|j| lower_triangle[i.max(j)][i.min(j)])
             }),

@@ -159,7 +159,7 @@ fn write_state(world: &World, t_ms: u64, out: &mut impl Write) -> Result<()> {
     };
     for robot in robots {
         let kinematics = world.kinematics(robot);
-        state.ee.push(kinematics.end_effector.origin.lane(0));
+        state.ee.push(kinematics.end_effector.origin.to_array());
         let MalletState {
             position: [x, y, z],
             velocity: [vx, vy],

@@ -1,4 +1,4 @@
-//! Time zones of stages.
+//! Time zones of stages. [`IanaTimeZone`] is a `jiff` time zone that has a name, so that it can be stored and shown.
 
 use jiff::{Timestamp, civil::Date, tz::TimeZone};
 use serde::{Deserialize, Serialize};
@@ -6,11 +6,11 @@ use std::{fmt, str::FromStr};
 
 /// A time zone by its name in the IANA database, e.g. `Europe/Berlin` or `UTC`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema), schema(value_type = String, example = "Europe/Berlin"))]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema), schema(as = Zone, value_type = String, example = "Europe/Berlin"))]
 #[serde(try_from = "String", into = "String")]
-pub struct Zone(TimeZone);
+pub struct IanaTimeZone(TimeZone);
 
-impl Zone {
+impl IanaTimeZone {
     pub const UTC: Self = Self(TimeZone::UTC);
 
     #[must_use]
@@ -25,13 +25,13 @@ impl Zone {
     }
 }
 
-impl Default for Zone {
+impl Default for IanaTimeZone {
     fn default() -> Self {
         Self::UTC
     }
 }
 
-impl fmt::Display for Zone {
+impl fmt::Display for IanaTimeZone {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         // `from_str` accepts only zones with a name.
         f.pad(self.0.iana_name().unwrap_or("UTC"))
@@ -41,15 +41,15 @@ impl fmt::Display for Zone {
 /// Text that is not the name of a time zone.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0:?} is no time zone: expected a name of the IANA database, as “Europe/Berlin” or “UTC”")]
-pub struct UnknownZone(String);
+pub struct UnknownTimeZone(String);
 
-impl FromStr for Zone {
-    type Err = UnknownZone;
-    fn from_str(name: &str) -> Result<Self, UnknownZone> {
+impl FromStr for IanaTimeZone {
+    type Err = UnknownTimeZone;
+    fn from_str(name: &str) -> Result<Self, UnknownTimeZone> {
         if name == "UTC" {
             return Ok(Self::UTC);
         }
-        let unknown = || UnknownZone(name.to_owned());
+        let unknown = || UnknownTimeZone(name.to_owned());
         let zone = TimeZone::get(name).map_err(|_| unknown())?;
         // `TimeZone::get` also knows "Etc/Unknown".
         match zone.iana_name() {
@@ -59,15 +59,15 @@ impl FromStr for Zone {
     }
 }
 
-impl TryFrom<String> for Zone {
-    type Error = UnknownZone;
-    fn try_from(name: String) -> Result<Self, UnknownZone> {
+impl TryFrom<String> for IanaTimeZone {
+    type Error = UnknownTimeZone;
+    fn try_from(name: String) -> Result<Self, UnknownTimeZone> {
         name.parse()
     }
 }
 
-impl From<Zone> for String {
-    fn from(zone: Zone) -> Self {
+impl From<IanaTimeZone> for String {
+    fn from(zone: IanaTimeZone) -> Self {
         zone.to_string()
     }
 }
@@ -80,7 +80,7 @@ mod tests {
     fn zone_gives_the_local_date() {
         let half_past_eleven: Timestamp = "2026-03-01T23:30:00Z".parse().unwrap();
         let date = |name: &str| {
-            name.parse::<Zone>()
+            name.parse::<IanaTimeZone>()
                 .unwrap()
                 .date(half_past_eleven)
                 .to_string()
@@ -93,10 +93,10 @@ mod tests {
     #[test]
     fn zone_names_round_trip_and_others_are_refused() {
         for name in ["UTC", "Europe/Berlin", "Pacific/Auckland"] {
-            assert_eq!(name.parse::<Zone>().unwrap().to_string(), name);
+            assert_eq!(name.parse::<IanaTimeZone>().unwrap().to_string(), name);
         }
         for wrong in ["", "Berlin", "Europe/Atlantis", "+01:00", "Etc/Unknown"] {
-            let error = wrong.parse::<Zone>().unwrap_err().to_string();
+            let error = wrong.parse::<IanaTimeZone>().unwrap_err().to_string();
             assert!(error.contains("Europe/Berlin"), "{error}");
         }
     }

@@ -1,4 +1,4 @@
-//! The heading of a board: stage, notices, rules, and links to other boards.
+//! Information about a board, around its table: stage, notices, rules, and links to other boards.
 
 use super::address::Address;
 use crate::{
@@ -21,7 +21,7 @@ use faceoff_types::{Competition, DivisionName, Task, TaskWeights, TierBounds};
 use jiff::Timestamp;
 use std::iter;
 
-pub(super) struct Heading {
+pub(super) struct BoardInfo {
     pub(super) stage: String,
     /// Dates of the stage.
     pub(super) dates: String,
@@ -75,7 +75,7 @@ pub(super) struct Tab {
     pub(super) is_shown: bool,
 }
 
-impl Heading {
+impl BoardInfo {
     pub(super) async fn load(
         app: &App,
         board: &BoardView,
@@ -86,7 +86,7 @@ impl Heading {
         let is_hidden = visibility.is_hidden(board.stage);
         let stages = stage::all(app).await?;
         let mut other_boards = Vec::new();
-        let mut heading = None;
+        let mut info = None;
         for stage in stages {
             let is_shown = stage.id == board.stage;
             for rules in &stage.revisions {
@@ -108,7 +108,7 @@ impl Heading {
                 });
             }
             if is_shown {
-                heading = Some(Self {
+                info = Some(Self {
                     dates: stage_dates(&stage),
                     next_evaluation: stage.next_cutoff.as_ref().map(NextEvaluation::new),
                     rules: (stage.revisions.len() > 1).then(|| {
@@ -140,11 +140,11 @@ impl Heading {
                 });
             }
         }
-        let heading = heading.ok_or_else(|| Problem::internal("board without its stage"))?;
+        let info = info.ok_or_else(|| Problem::internal("board without its stage"))?;
         Ok(Self {
             other_boards,
             paused,
-            ..heading
+            ..info
         })
     }
 }

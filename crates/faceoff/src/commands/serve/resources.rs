@@ -1,4 +1,5 @@
-//! What serving a season needs, whether it runs or is archived: the opened data folder, the address and the HTTP settings.
+//! The resources of a server, of a running or an archived season: the locked data folder with the opened database, the bound address and
+//! the HTTP settings.
 
 use super::{
     clock::server_clock,
@@ -25,7 +26,8 @@ use std::{
 };
 use tokio::net::TcpListener;
 
-pub(super) struct Site {
+/// The resources that the server opens before it accepts connections, and keeps until it ends.
+pub(super) struct ServerResources {
     pub(super) store: Store,
     pub(super) listener: TcpListener,
     pub(super) address: SocketAddr,
@@ -37,7 +39,7 @@ pub(super) struct Site {
     _lock: File,
 }
 
-impl Site {
+impl ServerResources {
     /// Locks and opens the existing data folder and binds the address. `disks` are folders on the disks whose free space is
     /// watched.
     ///

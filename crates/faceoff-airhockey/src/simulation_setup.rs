@@ -1,5 +1,4 @@
-//! The settings that all episodes of an evaluation, or all rallies of a game, have in common. From them an [`Arena`] creates the
-//! simulations.
+//! The setup of simulations: the settings that all episodes of an evaluation, or all rallies of a game, have in common.
 
 use faceoff_sim::{
     AirHockeyProfile, AirHockeyRuleset, AirHockeyTask, Bounds, Episode, Factors, Game, GameSetup,
@@ -7,10 +6,10 @@ use faceoff_sim::{
 };
 use faceoff_types::{Seed, Task};
 
-/// Rules, perturbations, the season's plant (the true robot, which deviates from the nominal one that agents know) and the seed
-/// from which the seeds of episodes and rallies are derived.
+/// Creates the simulations of episodes and games. It has rules, perturbations, the season's plant (the true robot, which deviates from the
+/// nominal one that agents know) and the seed from which the seeds of episodes and rallies are derived.
 #[derive(Debug, Clone)]
-pub struct Arena {
+pub struct SimulationSetup {
     bounds: Bounds,
     /// The active kinds of perturbations.
     factors: Factors,
@@ -20,8 +19,8 @@ pub struct Arena {
     seed: Seed,
 }
 
-impl Arena {
-    /// An arena with the current ruleset and its magnitudes of perturbations.
+impl SimulationSetup {
+    /// A setup with the current ruleset and its magnitudes of perturbations.
     #[must_use]
     pub fn new(profile: AirHockeyProfile, seed: Seed, mismatch_seed: Seed) -> Self {
         let magnitudes = PerturbationSettings::default();
@@ -34,8 +33,8 @@ impl Arena {
         )
     }
 
-    /// An arena with a ruleset, and with magnitudes for the perturbations of the profile. It draws the plant from `mismatch_seed`,
-    /// which takes milliseconds, so use one arena for many episodes.
+    /// A setup with a ruleset, and with magnitudes for the perturbations of the profile. It draws the plant from `mismatch_seed`,
+    /// which takes milliseconds, so use one setup for many episodes.
     #[must_use]
     pub fn with_ruleset(
         ruleset: AirHockeyRuleset,
@@ -84,7 +83,7 @@ impl Arena {
         .with_bounds(self.bounds)
     }
 
-    /// A game at the start of its first rally. The arena's seed must be the game's.
+    /// A game at the start of its first rally. The setup's seed must be the game's.
     #[must_use]
     pub fn game(&self, interpolation: [Interpolation; 2]) -> Game {
         Game::new(GameSetup {

@@ -1,4 +1,4 @@
-//! Entries of evaluations: the purpose, submission, team and day of each, without its state and result.
+//! Specifications of evaluations: the purpose, submission, team and day of each, without its state and result.
 
 use crate::{
     column::Instant,
@@ -11,7 +11,7 @@ use sqlx::{SqliteConnection, types::Text};
 
 /// The fixed data of an evaluation, without its state.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Entry {
+pub(crate) struct EvaluationSpec {
     pub(crate) id: EvaluationId,
     pub(crate) submission: SubmissionId,
     pub(crate) team: TeamId,
@@ -24,7 +24,10 @@ pub(crate) struct Entry {
 }
 
 /// The evaluation with this id.
-pub(crate) async fn find(connection: &mut SqliteConnection, id: EvaluationId) -> Result<Entry> {
+pub(crate) async fn find(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+) -> Result<EvaluationSpec> {
     let row = sqlx::query!(
         r#"SELECT submission_id AS submission, team_id AS team, stage_id AS stage, day AS "day!", revision, run_id AS run,
                 rerun_of
@@ -34,7 +37,7 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: EvaluationId) ->
     .fetch_optional(connection)
     .await?
     .ok_or(StoreError::NotFound("evaluation"))?;
-    Ok(Entry {
+    Ok(EvaluationSpec {
         id,
         submission: row.submission,
         team: row.team,
@@ -62,26 +65,26 @@ fn one_per_day(date: Date) -> impl FnOnce(sqlx::Error) -> StoreError {
 /// is open.
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,
-    entry: &Entry,
+    spec: &EvaluationSpec,
     now: Timestamp,
 ) -> Result<()> {
     sqlx::query!(
         "INSERT INTO evaluations (id, purpose, submission_id, team_id, stage_id, day, revision, run_id, created_at,
                                   state, rerun_of)
          VALUES (?, 'counting', ?, ?, ?, ?, ?, ?, ?, 'open', ?)",
-        entry.id,
-        entry.submission,
-        entry.team,
-        entry.stage_day.stage,
-        Text(entry.stage_day.date),
-        entry.revision,
-        entry.run,
+        spec.id,
+        spec.submission,
+        spec.team,
+        spec.stage_day.stage,
+        Text(spec.stage_day.date),
+        spec.revision,
+        spec.run,
         Instant(now),
-        entry.rerun_of,
+        spec.rerun_of,
     )
     .execute(connection)
     .await
-    .map_err(one_per_day(entry.stage_day.date))?;
+    .map_err(one_per_day(spec.stage_day.date))?;
     Ok(())
 }
 
