@@ -138,7 +138,7 @@ async fn serve(
             shutdown,
         )
     });
-    let upload_dir = site.upload_dir.clone();
+    let upload_dir = resources.upload_dir.clone();
     tasks.spawn(|shutdown| expired_uploads::remove(upload_dir, clock.clone(), shutdown));
     tasks.spawn(|shutdown| clock::watch(clock.clone(), data_dir, shutdown));
     tasks.spawn(|shutdown| {
