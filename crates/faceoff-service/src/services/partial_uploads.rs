@@ -117,7 +117,7 @@ async fn append(
     if part.offset != received {
         return Err(wrong_offset(part.offset, received));
     }
-    let mut body = RateGuardedBody::new(part.body, app.config.limits.min_upload_rate);
+    let mut body = RateGuardedBody::of_part(part.body, app.config.limits.min_upload_rate);
     let appended = async {
         loop {
             let chunk = tokio::select! {

@@ -37,6 +37,18 @@ const MAX_LOOKUPS: usize = 16;
 /// Maximum length of a worker's description of a platform fault, in characters.
 const MAX_REASON_CHARS: usize = 500;
 
+/// Longest time without any answer of NATS. The client itself may wait forever for an answer that was lost with a connection.
+const NATS_TIMEOUT: Duration = Duration::from_secs(30);
+
+/// The answer of NATS, which ends a fetch of [`POLL_INTERVAL`] itself.
+///
+/// # Errors
+/// If there is none in time.
+async fn in_time<T>(answer: impl Future<Output = T>) -> anyhow::Result<T> {
+    let answer = tokio::time::timeout(NATS_TIMEOUT, answer).await;
+    answer.context("NATS has not answered in time while results were fetched")
+}
+
 impl Dispatcher {
     /// Accepts results until the shutdown.
     pub(super) async fn accept_results(
@@ -65,15 +77,14 @@ impl Dispatcher {
             while checks.len() >= MAX_CONCURRENT_CHECKS {
                 join_result(checks.join_next().await)?;
             }
-            let mut results = consumer
+            let results = consumer
                 .batch()
                 .max_messages(MAX_CONCURRENT_CHECKS - checks.len())
                 .expires(POLL_INTERVAL)
-                .messages()
-                .await
-                .context("fetching results")?;
+                .messages();
+            let mut results = in_time(results).await?.context("fetching results")?;
             let mut is_empty = true;
-            while let Some(message) = results.next().await {
+            while let Some(message) = in_time(results.next()).await? {
                 is_empty = false;
                 let message = message.map_err(|error| anyhow::anyhow!(error))?;
                 let dispatcher = Arc::clone(self);
@@ -88,7 +99,7 @@ impl Dispatcher {
             }
             if is_empty {
                 let checked = self.streams.check_results(&mut consumer, &mut undelivered);
-                checked.await?;
+                in_time(checked).await??;
             }
         }
         Ok(())
