@@ -29,6 +29,7 @@ const UPLOAD_LENGTH: HeaderName = HeaderName::from_static("upload-length");
     params(("blake3" = String, Path, description = "BLAKE3 hash of the whole bundle, 64 hexadecimal digits")),
     responses(
         (status = 200, body = PartialUploadView),
+        (status = 400, description = "no hash"),
         (status = 404, description = "no part of it has arrived, or none within the last day"),
     )
 )]
@@ -56,9 +57,11 @@ pub(crate) async fn partial_upload(
     request_body(description = "the bytes", content((inline(Binary) = "application/octet-stream"))),
     responses(
         (status = 200, body = PartialUploadView),
+        (status = 400, description = "no hash, a header is missing, or the part is longer than the bundle"),
         (status = 408, description = "the upload stalled, or was too slow; what has arrived is kept"),
         (status = 409, description = "the part does not follow what has arrived (`received_bytes`), a newer connection has taken the upload over, the season is closed, or the team's storage is full"),
         (status = 413, description = "larger than `max_bundle_bytes`"),
+        (status = 415, description = "not a supported bundle format"),
         (status = 429, description = "too many uploads are running, too many submissions wait for their validation run, or the daily quota is used up"),
         (status = 507, description = "the server's disk has too little free space"),
     )
@@ -93,7 +96,11 @@ pub(crate) async fn add_part(
 #[utoipa::path(
     delete, path = "/uploads/{blake3}", tag = "team", security(("team" = [])),
     params(("blake3" = String, Path, description = "BLAKE3 hash of the whole bundle, 64 hexadecimal digits")),
-    responses((status = 204), (status = 404, description = "no part of it has arrived")),
+    responses(
+        (status = 204),
+        (status = 400, description = "no hash"),
+        (status = 404, description = "no part of it has arrived"),
+    ),
 )]
 pub(crate) async fn remove_upload(
     caller: TeamCaller,
