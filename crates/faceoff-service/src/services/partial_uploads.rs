@@ -15,6 +15,7 @@ use crate::{
     upload_slots::UploadSlot,
 };
 use axum::body::Body;
+use faceoff_dataset::allow_missing;
 use faceoff_types::{ArchiveFormat, TeamId};
 use jiff::{SignedDuration, Timestamp};
 use std::{
@@ -343,11 +344,4 @@ fn files_in(folder: &Path) -> io::Result<Vec<(Timestamp, PathBuf)>> {
         }
     }
     Ok(files)
-}
-
-fn allow_missing(removed: io::Result<()>) -> io::Result<()> {
-    match removed {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-        removed => removed,
-    }
 }

@@ -33,6 +33,9 @@ const PATIENCE: Duration = Duration::from_mins(5);
 /// Longest time without a byte sent or an answer received; then the connection is given up.
 const STALL_TIMEOUT: Duration = Duration::from_secs(60);
 
+/// A slow link sends at least one chunk in [`STALL_TIMEOUT`].
+const CHUNK_BYTES: usize = 16 << 10;
+
 /// Longest duration of a part. The HTTP client counts the time in which it sends as silence of the server.
 const UPLOAD_TIMEOUT: Duration = Duration::from_hours(24);
 
@@ -90,7 +93,7 @@ impl PartialUpload<'_> {
             .context("reading the bundle")?;
         let newest_chunk = Arc::new(Mutex::new(Instant::now()));
         let (progress, sent) = (self.progress.clone(), Arc::clone(&newest_chunk));
-        let stream = ReaderStream::with_capacity(file, 64 * 1024).inspect(move |chunk| {
+        let stream = ReaderStream::with_capacity(file, CHUNK_BYTES).inspect(move |chunk| {
             progress.inc(chunk.as_ref().map_or(0, |chunk| chunk.len() as u64));
             *sent.lock().unwrap_or_else(PoisonError::into_inner) = Instant::now();
         });
