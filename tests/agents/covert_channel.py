@@ -79,7 +79,8 @@ def forks():
 
 # Numbers without a name are those of the system calls, commands and flags that the keys describe, on x86-64.
 calls = {
-    "flock": lambda: call(73, shared, fcntl.LOCK_EX | fcntl.LOCK_NB),
+    "exclusive_lock_of_file": lambda: call(73, shared, fcntl.LOCK_EX | fcntl.LOCK_NB),
+    "shared_lock_of_file": lambda: call(73, shared, fcntl.LOCK_SH | fcntl.LOCK_NB),
     "lock": lambda: control_lock(fcntl.F_SETLK),
     "lock_query": lambda: control_lock(fcntl.F_GETLK, fcntl.F_WRLCK),
     "open_file_lock": lambda: control_lock(37),

@@ -21,7 +21,7 @@ def read(path):
 
 
 hidden = sys.argv[2:] + [
-    "/etc/shadow", "/etc/hostname", "/etc/ssl", "/etc/machine-id", "/root", "/home", "/var/lib", "/run",
+    "/etc/shadow", "/etc/ssl", "/etc/machine-id", "/root", "/home", "/var/lib", "/run",
     "/sys/kernel", "/srv", "/boot", "/proc/1/root/etc/shadow", "/proc/1/cwd/../../etc/shadow",
     "/proc/kcore", "/dev/mem", "/dev/kmsg", "/dev/vda", "/dev/sda", "/dev/fuse", "/dev/kvm",
 ]
@@ -33,7 +33,13 @@ for path in hidden:
 
 processes = [entry for entry in os.listdir("/proc") if entry.isdigit()]
 status = dict(line.split(":", 1) for line in read("/proc/self/status").splitlines() if ":" in line)
+init = dict(line.split(":", 1) for line in read("/proc/1/status").splitlines() if ":" in line)
 print(json.dumps({
+    "init": {
+        "capabilities": init["CapPrm"].strip(),
+        "filters": init["Seccomp_filters"].strip(),
+        "command_line": read("/proc/1/cmdline").replace("\0", " "),
+    },
     "reached": reached,
     # Names only: if the sandbox leaks values, the test's log must not show them.
     "environment": sorted(os.environ),
@@ -55,7 +61,7 @@ print(json.dumps({
     "directory": os.getcwd(),
     "bundle": sorted(os.listdir(".")),
     "terminal": attempt(lambda: os.open("/dev/tty", os.O_RDWR)),
-    "session_is_own": os.getsid(0) in (0, os.getpid()),
+    "session_is_own": os.getsid(0) in (0, 1),
     "cpus": sorted(os.sched_getaffinity(0)),
     "status": {name: value.strip() for name, value in status.items()},
 }), flush=True)

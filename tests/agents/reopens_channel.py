@@ -1,5 +1,5 @@
 """Tries to reopen its standard input and output by each of their names in `/proc`, in this process and in a child. Also
-tries to shrink the input and to enlarge the buffer of its log. Reports each error's name, or `ok`.
+tries to shrink the input and to enlarge the buffers of its output and its log. Reports each error's name, or `ok`.
 """
 import errno
 import fcntl
@@ -58,10 +58,11 @@ if stat.S_ISFIFO(os.fstat(0).st_mode):
 copy = os.dup(0)
 for label, fd in (("input", 0), ("output", 1), ("copy", copy)):
     found[f"shrink {label}"] = attempt(lambda: fcntl.fcntl(fd, F_SETPIPE_SZ, 4096))
-with socket.socket(fileno=os.dup(2)) as log:
-    before = log.getsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF)
-    found["send_buffer"] = attempt(lambda: log.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4 * before))
-    if log.getsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF) == before:
+found["shrink log"] = attempt(lambda: fcntl.fcntl(2, F_SETPIPE_SZ, 1 << 20))
+with socket.socket(fileno=os.dup(1)) as output:
+    before = output.getsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF)
+    found["send_buffer"] = attempt(lambda: output.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4 * before))
+    if output.getsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF) == before:
         found["send_buffer"] = "stays"
 stop.set()
 other.join()

@@ -1,38 +1,43 @@
 //! System calls of agents that the service answers in place of the kernel (*user notification* of seccomp).
 //!
-//! `statfs`, `fstatfs` and `sysinfo` show counters of the whole host, which an upload, a visitor or another agent moves. They cannot
-//! fail: C libraries do not check `sysinfo`, and old ones find `/dev/shm` by `statfs`. So every agent gets the same figures at any
-//! time. `setsid` is executed, but only now and then ([`crate::session_numbers`]).
+//! - `statfs`, `fstatfs` and `sysinfo` show counters of the whole host, which an upload, a visitor or another agent moves. They cannot
+//!   fail: C libraries do not check `sysinfo`, and old ones find `/dev/shm` by `statfs`. So every agent gets the same figures at any
+//!   time.
+//! - `setsid` is executed, but only now and then ([`crate::session_numbers`]).
+//! - `flock` is executed on an agent's own files ([`crate::file_locks`]).
+//! - `socket` of the internet's families is executed up to a number of sockets, whose buffers are memory that all programs of the host share.
+//! - `sched_getaffinity` and `sched_setaffinity` translate the agent's numbers of its CPUs ([`crate::cpu_numbers`]).
 //!
 //! A call waits until this service has answered it. Only the calling thread waits, and the answers are slower the more there are, so
 //! that no agent can keep the evaluator's CPUs busy.
 
 use crate::{
-    SandboxError,
+    Layer, SandboxError, SpawnSpec,
+    call_listener::{install_with_listener, let_execute, receive_call, send_reply},
+    caller::Caller,
     cpu_clock::own_cpu_time,
+    cpu_numbers::CpuNumbers,
     error::IoContext,
+    file_locks::{FileLocks, LockOutcome},
+    memory_view::MemoryView,
     seccomp,
     session_numbers::{self, SessionBudget},
 };
 use rustix::{
-    event::{PollFd, PollFlags, poll},
+    event::{PollFd, PollFlags, Timespec, poll},
     io::Errno,
     net::{
         AddressFamily, RecvAncillaryBuffer, RecvAncillaryMessage, RecvFlags, SendAncillaryBuffer,
         SendAncillaryMessage, SendFlags, SocketFlags, SocketType, recvmsg, sendmsg, socketpair,
     },
-    system::sysinfo,
-    thread::set_no_new_privs,
+    system::{Sysinfo, sysinfo},
+    thread::{sched_getaffinity, sched_setaffinity, set_no_new_privs},
 };
 use seccompiler::BpfProgram;
 use std::{
-    fs::File,
     io::{self, IoSlice, IoSliceMut},
     mem::MaybeUninit,
-    os::{
-        fd::{AsFd, AsRawFd, FromRawFd, OwnedFd},
-        unix::fs::FileExt,
-    },
+    os::fd::{AsFd, OwnedFd},
     sync::OnceLock,
     thread::JoinHandle,
     time::{Duration, Instant},
@@ -47,6 +52,11 @@ const FREE_FILES: u64 = 65_536;
 const MAX_NAME_BYTES: u64 = 255;
 /// Flags in `statfs`: the flags are valid, no set-id programs, no devices.
 const MOUNT_FLAGS: u64 = 0x20 | 0x2 | 0x4;
+
+/// Sockets that an agent may have open when it makes another one of the internet's families; a connection accepted by itself comes on top.
+const MAX_SOCKETS: i32 = 256;
+/// Longest mask of CPUs that is read, in bytes.
+const MAX_MASK_BYTES: usize = 128;
 
 /// CPU time of all answers without a pause.
 const QUICK_ANSWERS: Duration = Duration::from_millis(20);
@@ -67,12 +77,12 @@ pub(crate) struct AnsweredCalls {
 #[derive(Debug)]
 pub(crate) struct CallAnswerer {
     socket: OwnedFd,
-    answers: FixedAnswers,
+    answers: Answers,
 }
 
 impl AnsweredCalls {
-    /// Both sides for one agent, whose scratch folder has `scratch_bytes`.
-    pub(crate) fn new(scratch_bytes: u64) -> Result<(Self, CallAnswerer), SandboxError> {
+    /// Both sides for one agent.
+    pub(crate) fn new(spec: &SpawnSpec) -> Result<(Self, CallAnswerer), SandboxError> {
         let (socket, child_socket) = socketpair(
             AddressFamily::UNIX,
             SocketType::STREAM,
@@ -80,14 +90,17 @@ impl AnsweredCalls {
             None,
         )
         .context("cannot make a socket for the agent's system calls")?;
-        let answers = FixedAnswers {
-            blocks: free_blocks(scratch_bytes),
+        let cpus = CpuNumbers::new(spec);
+        let program = seccomp::answered_calls(cpus.is_renumbered())?;
+        let answers = Answers {
+            file_system: file_system(free_blocks(spec.limits.scratch_bytes)),
+            system: system(MemoryView::new(spec)),
+            cpus,
+            has_own_files: spec.isolation.enforces(Layer::Namespaces),
         };
-        // Read before the first agent starts.
-        FixedAnswers::host();
         Ok((
             Self {
-                program: seccomp::answered_calls()?,
+                program,
                 child_socket,
             },
             CallAnswerer { socket, answers },
@@ -124,8 +137,14 @@ impl CallAnswerer {
             .name("agent-calls".into())
             .spawn(move || {
                 block_signals();
-                let sessions = answer_calls(&listener, answers);
-                session_numbers::skip_some(sessions);
+                let mut answerer = Answerer {
+                    listener: &listener,
+                    answers,
+                    sessions: SessionBudget::new(Instant::now()),
+                    locks: FileLocks::default(),
+                };
+                answerer.answer_calls();
+                session_numbers::skip_some(answerer.sessions.started);
             })
             .context(ACTION)?;
         Ok(AnswerThread(thread))
@@ -182,129 +201,261 @@ fn receive_listener(socket: &OwnedFd) -> io::Result<OwnedFd> {
         .ok_or_else(|| io::Error::other("the child has sent no descriptor"))
 }
 
-/// The figures that all agents get.
-#[derive(Debug, Clone, Copy)]
-struct FixedAnswers {
-    /// Size of every file system, in blocks.
-    blocks: u64,
+/// What an agent is answered.
+#[derive(Debug)]
+struct Answers {
+    file_system: [u64; 15],
+    system: [u64; 14],
+    cpus: CpuNumbers,
+    /// Are its scratch folders its own?
+    has_own_files: bool,
 }
 
-impl FixedAnswers {
-    /// The answer of `statfs` and `fstatfs`: an empty file system of the scratch folder's size. On 64-bit machines the fields of the
-    /// kernel's structure are 64-bit integers in this order; the last four are unused.
-    fn file_system(self) -> [u64; 15] {
-        let (size, free, available) = (self.blocks, self.blocks, self.blocks);
-        let (files, free_files) = (FREE_FILES, FREE_FILES);
-        let id = 0;
-        [
-            TMPFS_MAGIC,
-            BLOCK_BYTES,
-            size,
-            free,
-            available,
-            files,
-            free_files,
-            id,
-            MAX_NAME_BYTES,
-            BLOCK_BYTES,
-            MOUNT_FLAGS,
-            0,
-            0,
-            0,
-            0,
-        ]
-    }
+/// The answer of `statfs` and `fstatfs`: an empty file system of so many blocks. On 64-bit machines the fields of the kernel's structure are
+/// 64-bit integers in this order; the last four are unused.
+const fn file_system(blocks: u64) -> [u64; 15] {
+    let (size, free, available) = (blocks, blocks, blocks);
+    let (files, free_files) = (FREE_FILES, FREE_FILES);
+    let id = 0;
+    [
+        TMPFS_MAGIC,
+        BLOCK_BYTES,
+        size,
+        free,
+        available,
+        files,
+        free_files,
+        id,
+        MAX_NAME_BYTES,
+        BLOCK_BYTES,
+        MOUNT_FLAGS,
+        0,
+        0,
+        0,
+        0,
+    ]
+}
 
-    /// The answer of `sysinfo`: the host's figures before the first agent started. On 64-bit machines that put the lower byte first, the
-    /// fields of the kernel's structure and their padding are these integers.
-    fn host() -> &'static [u64; 14] {
-        static FIGURES: OnceLock<[u64; 14]> = OnceLock::new();
-        FIGURES.get_or_init(|| {
-            let host = sysinfo();
-            let [load_1, load_5, load_15] = host.loads;
-            [
-                host.uptime.cast_unsigned(),
-                load_1,
-                load_5,
-                load_15,
-                host.totalram,
-                host.freeram,
-                host.sharedram,
-                host.bufferram,
-                host.totalswap,
-                host.freeswap,
-                host.procs.into(),
-                host.totalhigh,
-                host.freehigh,
-                host.mem_unit.into(),
-            ]
-        })
-    }
+/// The answer of `sysinfo`: the host's figures before the first agent started, and the agent's memory. On 64-bit machines that put the lower
+/// byte first, the fields of the kernel's structure and their padding are these integers.
+fn system(memory: MemoryView) -> [u64; 14] {
+    static HOST: OnceLock<Sysinfo> = OnceLock::new();
+    let host = HOST.get_or_init(sysinfo);
+    let unit = u64::from(host.mem_unit).max(1);
+    let own = memory.bytes(host.totalram.saturating_mul(unit));
+    let [load_1, load_5, load_15] = host.loads;
+    let of_host = [
+        host.totalram,
+        host.freeram,
+        host.sharedram,
+        host.bufferram,
+        host.totalswap,
+        host.freeswap,
+    ];
+    let [total, free, shared, buffers, swap, free_swap] =
+        own.map_or(of_host, |bytes| [bytes / unit, bytes / unit, 0, 0, 0, 0]);
+    [
+        host.uptime.cast_unsigned(),
+        load_1,
+        load_5,
+        load_15,
+        total,
+        free,
+        shared,
+        buffers,
+        swap,
+        free_swap,
+        host.procs.into(),
+        host.totalhigh,
+        host.freehigh,
+        host.mem_unit.into(),
+    ]
 }
 
 /// How a call is answered.
 enum Reply {
-    /// It returns zero.
-    Done,
+    /// It returns this number.
+    Value(i64),
     Failed(Errno),
     /// The kernel executes it.
     Execute,
+    /// Later.
+    Waits,
 }
 
-/// Answers the calls until the last process with the filter has ended. Returns the number of its sessions.
-fn answer_calls(listener: &OwnedFd, answers: FixedAnswers) -> u32 {
-    let mut sessions = SessionBudget::new(Instant::now());
-    let mut last_answer = Duration::ZERO;
-    loop {
-        let mut fds = [PollFd::new(listener, PollFlags::IN)];
-        match poll(&mut fds, None) {
-            Ok(_) | Err(Errno::INTR) => {}
-            Err(_) => return sessions.started,
+impl From<LockOutcome> for Reply {
+    fn from(outcome: LockOutcome) -> Self {
+        match outcome {
+            LockOutcome::Done => Self::Value(0),
+            LockOutcome::Failed(error) => Self::Failed(error),
+            LockOutcome::Waits => Self::Waits,
         }
-        let events = fds[0].revents();
-        if !events.contains(PollFlags::IN) {
-            if events.is_empty() {
-                continue;
-            }
-            return sessions.started;
-        }
-        let begin = own_cpu_time();
-        if begin > QUICK_ANSWERS {
-            std::thread::sleep(PAUSE.max(last_answer * PAUSE_PER_CPU_TIME));
-        }
-        let call = match receive_call(listener) {
-            Ok(call) => call,
-            // The thread was killed or got a signal meanwhile.
-            Err(Errno::NOENT | Errno::INTR) => continue,
-            Err(_) => return sessions.started,
-        };
-        let reply = answer(listener, &call, answers, &mut sessions);
-        // Fails if the thread is dead, or has got a signal; then it repeats its call.
-        let _ = send_reply(listener, call.id, &reply);
-        last_answer = own_cpu_time().saturating_sub(begin);
     }
 }
 
-fn answer(
-    listener: &OwnedFd,
-    call: &libc::seccomp_notif,
-    answers: FixedAnswers,
-    sessions: &mut SessionBudget,
-) -> Reply {
-    let [first, second, ..] = call.data.args;
-    let written = match i64::from(call.data.nr) {
-        libc::SYS_statfs | libc::SYS_fstatfs => {
-            write_to_caller(listener, call, second, &answers.file_system())
+/// Answers the calls of one agent.
+struct Answerer<'a> {
+    listener: &'a OwnedFd,
+    answers: Answers,
+    sessions: SessionBudget,
+    locks: FileLocks,
+}
+
+impl Answerer<'_> {
+    /// Answers until the last process with the filter has ended.
+    fn answer_calls(&mut self) {
+        let mut last_answer = Duration::ZERO;
+        loop {
+            let events = {
+                let mut fds = [PollFd::new(self.listener, PollFlags::IN)];
+                match poll(&mut fds, self.time_until_retry().as_ref()) {
+                    Ok(_) | Err(Errno::INTR) => fds[0].revents(),
+                    Err(_) => return,
+                }
+            };
+            let is_asked = events.contains(PollFlags::IN);
+            if !is_asked && !events.is_empty() {
+                return;
+            }
+            let begin = own_cpu_time();
+            if begin > QUICK_ANSWERS {
+                std::thread::sleep(PAUSE.max(last_answer * PAUSE_PER_CPU_TIME));
+            }
+            self.retry_locks();
+            if is_asked && !self.answer_next() {
+                return;
+            }
+            last_answer = own_cpu_time().saturating_sub(begin);
         }
-        libc::SYS_sysinfo => write_to_caller(listener, call, first, FixedAnswers::host()),
-        libc::SYS_setsid if sessions.take(Instant::now()) => return Reply::Execute,
-        libc::SYS_setsid => return Reply::Failed(Errno::PERM),
-        _ => return Reply::Failed(Errno::NOSYS),
-    };
-    let error = match written {
-        Ok(()) => return Reply::Done,
-        Err(error) => error,
-    };
+    }
+
+    /// `None` if no lock is waited for.
+    fn time_until_retry(&self) -> Option<Timespec> {
+        let left = self
+            .locks
+            .next_try_at()?
+            .saturating_duration_since(Instant::now());
+        Timespec::try_from(left).ok()
+    }
+
+    fn retry_locks(&mut self) {
+        for (call, outcome) in self.locks.retry(self.listener.as_fd(), Instant::now()) {
+            self.reply(call, outcome.into());
+        }
+    }
+
+    /// Answers the next call; `false` if the last process has ended.
+    fn answer_next(&mut self) -> bool {
+        let call = match receive_call(self.listener) {
+            Ok(call) => call,
+            // The thread was killed or got a signal meanwhile.
+            Err(Errno::NOENT | Errno::INTR) => return true,
+            Err(_) => return false,
+        };
+        let reply = self
+            .answer(&call)
+            .unwrap_or_else(|error| Reply::Failed(errno_of(&error)));
+        self.reply(call.id, reply);
+        true
+    }
+
+    /// Fails if the thread is dead, or has got a signal; then it repeats its call.
+    fn reply(&self, call: u64, reply: Reply) {
+        let _ = match reply {
+            Reply::Value(value) => send_reply(self.listener, call, Ok(value)),
+            Reply::Failed(error) => send_reply(self.listener, call, Err(error)),
+            Reply::Execute => let_execute(self.listener, call),
+            Reply::Waits => Ok(()),
+        };
+    }
+
+    /// # Errors
+    /// When the caller's memory or files are not accessible.
+    fn answer(&mut self, call: &libc::seccomp_notif) -> io::Result<Reply> {
+        let caller = Caller {
+            listener: self.listener.as_fd(),
+            id: call.id,
+            thread: call.pid,
+        };
+        let [first, second, third, ..] = call.data.args;
+        // The lower half of an argument, as the kernel takes it for an `int`.
+        let int = |argument: u64| argument as i32;
+        match i64::from(call.data.nr) {
+            libc::SYS_statfs | libc::SYS_fstatfs => {
+                write_figures(caller, second, &self.answers.file_system)
+            }
+            libc::SYS_sysinfo => write_figures(caller, first, &self.answers.system),
+            libc::SYS_setsid if self.sessions.take(Instant::now()) => Ok(Reply::Execute),
+            libc::SYS_setsid => Ok(Reply::Failed(Errno::PERM)),
+            libc::SYS_socket if caller.sockets()? < MAX_SOCKETS => Ok(Reply::Execute),
+            libc::SYS_socket => Ok(Reply::Failed(Errno::NFILE)),
+            libc::SYS_flock => {
+                let has_own_files = self.answers.has_own_files;
+                let outcome = self
+                    .locks
+                    .lock(caller, int(first), int(second), has_own_files)?;
+                Ok(outcome.into())
+            }
+            libc::SYS_sched_getaffinity => self.affinity(caller, int(first), second, third),
+            libc::SYS_sched_setaffinity => self.set_affinity(caller, int(first), second, third),
+            _ => Ok(Reply::Failed(Errno::NOSYS)),
+        }
+    }
+
+    fn affinity(
+        &self,
+        caller: Caller<'_>,
+        thread: i32,
+        bytes: u64,
+        address: u64,
+    ) -> io::Result<Reply> {
+        let Some(thread) = caller.thread(thread)? else {
+            return Ok(Reply::Failed(Errno::SRCH));
+        };
+        let mask = self
+            .answers
+            .cpus
+            .agent_mask(&sched_getaffinity(Some(thread))?);
+        if bytes % 8 != 0 || bytes < mask.len() as u64 {
+            return Ok(Reply::Failed(Errno::INVAL));
+        }
+        caller.write(address, &mask)?;
+        Ok(Reply::Value(mask.len() as i64))
+    }
+
+    fn set_affinity(
+        &self,
+        caller: Caller<'_>,
+        thread: i32,
+        bytes: u64,
+        address: u64,
+    ) -> io::Result<Reply> {
+        let Some(thread) = caller.thread(thread)? else {
+            return Ok(Reply::Failed(Errno::SRCH));
+        };
+        let mut mask = [0; MAX_MASK_BYTES];
+        let read = &mut mask[..MAX_MASK_BYTES.min(bytes as usize)];
+        caller.read(address, read)?;
+        let set = self.answers.cpus.host_set(read);
+        if set.count() == 0 {
+            return Ok(Reply::Failed(Errno::INVAL));
+        }
+        sched_setaffinity(Some(thread), &set)?;
+        Ok(Reply::Value(0))
+    }
+}
+
+fn write_figures(caller: Caller<'_>, address: u64, figures: &[u64]) -> io::Result<Reply> {
+    let bytes: Vec<u8> = figures
+        .iter()
+        .flat_map(|figure| figure.to_ne_bytes())
+        .collect();
+    caller.write(address, &bytes)?;
+    Ok(Reply::Value(0))
+}
+
+/// The error that the caller gets when the service cannot answer.
+fn errno_of(error: &io::Error) -> Errno {
     if matches!(
         error.kind(),
         io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem
@@ -313,110 +464,12 @@ fn answer(
         WARNED.get_or_init(|| {
             tracing::error!(%error, "cannot answer an agent's system call: a root service needs CAP_SYS_PTRACE");
         });
-        return Reply::Failed(Errno::NOSYS);
+        return Errno::NOSYS;
     }
-    // There is no memory at this address, or the thread has ended meanwhile.
-    Reply::Failed(Errno::FAULT)
-}
-
-/// Writes into the memory of the calling thread.
-fn write_to_caller(
-    listener: &OwnedFd,
-    call: &libc::seccomp_notif,
-    address: u64,
-    figures: &[u64],
-) -> io::Result<()> {
-    let memory = File::options()
-        .write(true)
-        .open(format!("/proc/{}/mem", call.pid))?;
-    // If the call still waits now, its pid belonged to the caller when the file was opened.
-    check_waiting(listener, call.id)?;
-    let bytes: Vec<u8> = figures
-        .iter()
-        .flat_map(|figure| figure.to_ne_bytes())
-        .collect();
-    memory.write_all_at(&bytes, address)
-}
-
-/// Installs a filter in the calling process and returns its listener. With `WAIT_KILLABLE_RECV` (Linux 5.19) a call that this service has
-/// received is not repeated because of a signal.
-fn install_with_listener(program: &BpfProgram) -> Result<OwnedFd, Errno> {
-    const NEW_LISTENER: libc::c_ulong = 1 << 3;
-    const WAIT_KILLABLE_RECV: libc::c_ulong = 1 << 5;
-    let filter = libc::sock_fprog {
-        len: program.len() as libc::c_ushort,
-        filter: program.as_ptr().cast_mut().cast(),
-    };
-    let install = |flags: libc::c_ulong| {
-        #[expect(unsafe_code, reason = "no library installs a filter with a listener")]
-        // SAFETY: the kernel reads the program at this address during the call; the new descriptor has no other owner.
-        unsafe {
-            let fd = libc::syscall(
-                libc::SYS_seccomp,
-                libc::SECCOMP_SET_MODE_FILTER,
-                flags,
-                &raw const filter,
-            );
-            if fd < 0 {
-                return Err(last_error());
-            }
-            Ok(OwnedFd::from_raw_fd(fd as libc::c_int))
-        }
-    };
-    match install(NEW_LISTENER | WAIT_KILLABLE_RECV) {
-        Err(Errno::INVAL) => install(NEW_LISTENER),
-        result => result,
+    match Errno::from_io_error(error) {
+        // A file number that is not open, an unknown CPU.
+        Some(error @ (Errno::BADF | Errno::INVAL | Errno::SRCH)) => error,
+        // There is no memory at this address, or the thread has ended meanwhile.
+        _ => Errno::FAULT,
     }
-}
-
-fn receive_call(listener: &OwnedFd) -> Result<libc::seccomp_notif, Errno> {
-    #[expect(unsafe_code, reason = "the kernel requires a zeroed structure")]
-    // SAFETY: the structure consists of integers, for which zero is a value.
-    let mut call: libc::seccomp_notif = unsafe { MaybeUninit::zeroed().assume_init() };
-    control(listener, NOTIF_RECV, (&raw mut call).cast()).map(|()| call)
-}
-
-fn send_reply(listener: &OwnedFd, id: u64, reply: &Reply) -> Result<(), Errno> {
-    let (error, flags) = match reply {
-        Reply::Done => (0, 0),
-        Reply::Failed(error) => (-error.raw_os_error(), 0),
-        Reply::Execute => (0, EXECUTE),
-    };
-    let mut answer = libc::seccomp_notif_resp {
-        id,
-        val: 0,
-        error,
-        flags,
-    };
-    control(listener, NOTIF_SEND, (&raw mut answer).cast())
-}
-
-fn check_waiting(listener: &OwnedFd, mut id: u64) -> Result<(), Errno> {
-    control(listener, NOTIF_ID_VALID, (&raw mut id).cast())
-}
-
-/// Requests of a listener (`SECCOMP_IOCTL_NOTIF_*`): direction, size, type `!` and number.
-const NOTIF_RECV: u32 = notification_request(3, size_of::<libc::seccomp_notif>(), 0);
-const NOTIF_SEND: u32 = notification_request(3, size_of::<libc::seccomp_notif_resp>(), 1);
-const NOTIF_ID_VALID: u32 = notification_request(1, size_of::<u64>(), 2);
-/// The flag `SECCOMP_USER_NOTIF_FLAG_CONTINUE`.
-const EXECUTE: u32 = 1;
-
-const fn notification_request(direction: u32, size: usize, number: u32) -> u32 {
-    (direction << 30) | ((size as u32) << 16) | ((b'!' as u32) << 8) | number
-}
-
-fn control(listener: &OwnedFd, request: u32, argument: *mut libc::c_void) -> Result<(), Errno> {
-    #[expect(unsafe_code, reason = "no library has the requests of a listener")]
-    // SAFETY: each caller passes a structure of the size that the request contains, which lives during the call.
-    let result = unsafe { libc::ioctl(listener.as_raw_fd(), request as _, argument) };
-    if result == -1 {
-        Err(last_error())
-    } else {
-        Ok(())
-    }
-}
-
-fn last_error() -> Errno {
-    Errno::from_io_error(&io::Error::last_os_error()).unwrap_or(Errno::INVAL)
 }

@@ -5,6 +5,7 @@ use crate::{
     bubblewrap_program::BubblewrapProgram,
     cpu_view::CpuView,
     error::IoContext,
+    memory_view::MemoryView,
     private_mounts::PrivateMounts,
     private_network::PrivateNetwork,
     seccomp::{self, Filters},
@@ -14,7 +15,10 @@ use std::{
     ffi::OsString,
     fs,
     io::{self, Seek, Write},
-    os::fd::{AsRawFd, OwnedFd},
+    os::{
+        fd::{AsRawFd, OwnedFd},
+        unix::ffi::OsStrExt,
+    },
     path::{Path, PathBuf},
     process::Command,
     sync::OnceLock,
@@ -24,6 +28,12 @@ use std::{
 const ID_IN_SANDBOX: &str = "1000";
 const PASSWD: &str = "agent:x:1000:1000:agent:/tmp:/bin/sh\n";
 const GROUP: &str = "agent:x:1000:\n";
+/// Names are looked up in files only: there is no network in which to ask for them.
+const NAME_SERVICES: &str = "passwd: files\ngroup: files\nhosts: files\n";
+/// The agent's host name.
+const HOST_NAME: &str = "agent";
+/// Content of `/etc/hosts`: an agent's own names.
+pub const HOSTS: &str = "127.0.0.1 localhost agent\n::1 localhost agent\n";
 
 /// The only files of `/proc` that are not hidden beside those of processes. All others show settings and counters of the whole host (locks,
 /// asynchronous I/O, interrupts, open files …).
@@ -62,7 +72,7 @@ const VISIBLE_IN_PROC: [&[&str]; 4] = [
 const TERMINALS: &str = "/dev/pts";
 
 /// Counters of the host that ordinary libraries read. Agents see snapshots that were taken before the first agent started, because
-/// the live counters would show what other agents do (e.g. the number of started processes). The snapshots list only the agent's CPUs.
+/// the live counters would show what other agents do (e.g. the number of started processes). The snapshots show the agent's CPUs and memory.
 const SNAPSHOT_NAMES: [&str; 5] = ["stat", "cpuinfo", "meminfo", "loadavg", "uptime"];
 
 /// An installed bubblewrap and its features.
@@ -126,15 +136,14 @@ impl Bubblewrap {
             "--gid",
             ID_IN_SANDBOX,
             "--hostname",
-            "agent",
+            HOST_NAME,
         ]);
         if self.disables_user_namespaces {
             line.args(["--disable-userns"]);
         }
-        // The agent is its namespace's first process: when it ends, the kernel kills all its remaining processes.
-        // And no helper process of bubblewrap, which no filter restricts, is inside for an agent to take over.
+        // The sandbox's first process is one of bubblewrap, which reaps processes whose parents have ended. The filters restrict it, too,
+        // and it ends with the agent: then the kernel kills all remaining processes.
         line.args([
-            "--as-pid-1",
             "--die-with-parent",
             "--new-session",
             "--cap-drop",
@@ -152,8 +161,9 @@ impl Bubblewrap {
         }
         line.args(["--proc", "/proc", "--dev", "/dev"]);
         line.hide_counters();
-        let cpus = CpuView::new(&spec.cpus, &spec.limits);
-        line.show_counter_snapshots(&cpus)?;
+        let cpus = CpuView::new(spec);
+        let memory = MemoryView::new(spec);
+        line.show_counter_snapshots(&cpus, &memory)?;
         // An image's root is read-only, so the folder for the CPU lists must be a new file system.
         if root.is_some() {
             line.args(["--perms", "0755", "--size", "65536", "--tmpfs", "/sys"]);
@@ -175,6 +185,17 @@ impl Bubblewrap {
                 line.file(path, content.as_bytes())?;
             }
         }
+        // An image has such files of its own.
+        if root.is_none() {
+            let hostname = format!("{HOST_NAME}\n");
+            for (path, content) in [
+                ("/etc/hostname", hostname.as_str()),
+                ("/etc/hosts", HOSTS),
+                ("/etc/nsswitch.conf", NAME_SERVICES),
+            ] {
+                line.file(path, content.as_bytes())?;
+            }
+        }
         line.bundle(&spec.bundle_dir)?;
         line.args([
             "--chdir",
@@ -193,11 +214,14 @@ impl Bubblewrap {
                 line.fd("--add-seccomp-fd", fd);
             }
         }
-        line.args(["--"]);
-        line.args(spec.command.iter().map(String::as_str));
         let mut command = Command::new(&self.program);
+        // The options are not on the command line, which the agent can read in `/proc/1`: they name the host's files.
+        let options = memory_file(&separated_by_nul(&line.args))?;
+        command.arg("--args").arg(options.as_raw_fd().to_string());
+        line.inherited_fds.push(options);
+        command.arg("--").args(&spec.command);
         // bubblewrap itself gets none of the bundle's variables: LD_PRELOAD would affect it outside the sandbox.
-        command.args(line.args).env_clear().current_dir("/");
+        command.env_clear().current_dir("/");
         Ok(Invocation {
             command,
             inherited_fds: line.inherited_fds,
@@ -229,7 +253,7 @@ pub(crate) fn environment(spec: &SpawnSpec, home: &str) -> Vec<(String, String)>
         // A thread of ONNX Runtime would send telemetry, retry without end, and use the agent's CPU time.
         ("ORT_DISABLE_TELEMETRY".to_owned(), "1".to_owned()),
     ]);
-    variables.extend(CpuView::new(&spec.cpus, &spec.limits).variables());
+    variables.extend(CpuView::new(spec).variables());
     variables.extend(spec.env.clone());
     variables.into_iter().collect()
 }
@@ -267,7 +291,11 @@ impl CommandLine {
     }
 
     /// Mounts the snapshots over the host's counters.
-    fn show_counter_snapshots(&mut self, cpus: &CpuView) -> Result<(), SandboxError> {
+    fn show_counter_snapshots(
+        &mut self,
+        cpus: &CpuView,
+        memory: &MemoryView,
+    ) -> Result<(), SandboxError> {
         static SNAPSHOTS: OnceLock<Vec<(String, Vec<u8>)>> = OnceLock::new();
         let snapshots = SNAPSHOTS.get_or_init(|| {
             let paths = SNAPSHOT_NAMES.map(|name| format!("/proc/{name}"));
@@ -278,7 +306,11 @@ impl CommandLine {
             paths.into_iter().filter_map(read).collect()
         });
         for (path, content) in snapshots {
-            self.cover(path, &cpus.filter_file(path, content))?;
+            let content = match path.as_str() {
+                "/proc/meminfo" => memory.filter_file(content),
+                _ => cpus.filter_file(path, content),
+            };
+            self.cover(path, &content)?;
         }
         Ok(())
     }
@@ -399,6 +431,13 @@ pub(crate) fn mount_order(paths: &[PathBuf]) -> Vec<PathBuf> {
         }
     }
     mounts
+}
+
+/// The format of bubblewrap's option `--args`.
+fn separated_by_nul(args: &[OsString]) -> Vec<u8> {
+    args.iter()
+        .flat_map(|arg| arg.as_bytes().iter().copied().chain([0]))
+        .collect()
 }
 
 /// An anonymous file in memory, positioned at its start.

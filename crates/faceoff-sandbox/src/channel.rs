@@ -1,25 +1,30 @@
 //! The channel between service and agent: questions (lines to its standard input), answers (lines from its standard output), and its
 //! log (standard error).
 //!
-//! All three are stream sockets, never pipes. A pipe has a single lock, held by the thread that is inside a call
+//! Questions and answers pass through stream sockets, never pipes. A pipe has a single lock, held by the thread that is inside a call
 //! on it. An agent can stay inside a call as long as it likes: in a `splice` from an empty socket, or in a `write`
 //! of memory whose page fault waits for another of its threads. Reading, writing, closing, and even querying the
 //! number of bytes would wait for that lock, even on a non-blocking pipe.
+//!
+//! The log is a pipe, so that programs can open `/dev/stderr`. Only the thread that reads it ([`crate::stderr_log`]) waits for its lock;
+//! nothing else waits for that thread before the agent's processes have ended.
 //!
 //! Each end of a socket pair has its own lock, and no thread sleeps while it holds one. An agent can still make
 //! the service's calls expensive: each read wakes all threads that poll the other end for space. Therefore reads
 //! are small, and their time counts as the agent's time.
 //!
-//! Neither the agent nor a child of it can reopen an end by path through `/proc/*/fd`. The writer's buffer
+//! Neither the agent nor a child of it can reopen an end of a socket by path through `/proc/*/fd`. The writer's buffer
 //! determines the space for a question, so no agent can make it smaller.
 
 use crate::{SandboxError, error::IoContext, fd_passing, line_socket::LineSocket};
 use rustix::{
-    fs::fstat,
+    fs::{Mode, fchmod, fstat},
+    io::ioctl_fionbio,
     net::{
         AddressFamily, Shutdown, SocketFlags, SocketType, shutdown, socketpair,
         sockopt::{set_socket_send_buffer_size, socket_send_buffer_size},
     },
+    pipe::{PipeFlags, fcntl_setpipe_size, pipe_with},
 };
 use std::{
     io,
@@ -28,8 +33,7 @@ use std::{
 
 /// Buffer size for questions: no question is longer, and an `end` followed by a `reset` fits as well.
 const QUESTION_BUFFER_BYTES: usize = 64 << 10;
-/// Buffer size for the unread part of the log. One read may take all of it, and an agent may have written it byte by byte, which
-/// makes the read slow.
+/// Buffer size for the unread part of the log.
 const LOG_BUFFER_BYTES: usize = 16 << 10;
 
 /// The service's ends and the agent's ends.
@@ -47,7 +51,7 @@ impl Channel {
         const ACTION: &str = "cannot make a channel to the agent";
         let (stdin, input) = socket_pair().context(ACTION)?;
         let (output, stdout) = socket_pair().context(ACTION)?;
-        let (log, stderr) = socket_pair().context(ACTION)?;
+        let (log, stderr) = log_pipe().context(ACTION)?;
         set_socket_send_buffer_size(&input, 2 * QUESTION_BUFFER_BYTES).context(ACTION)?;
         let size = socket_send_buffer_size(&input).context(ACTION)?;
         if size < QUESTION_BUFFER_BYTES {
@@ -55,13 +59,10 @@ impl Channel {
                 format!("the socket holds {size} bytes, {QUESTION_BUFFER_BYTES} are needed");
             return Err(SandboxError::other(ACTION, reason));
         }
-        set_socket_send_buffer_size(&stderr, LOG_BUFFER_BYTES).context(ACTION)?;
         // Without this, bytes that an agent writes to its standard input would stay unread in the socket. The other
-        // two sockets stay open in both directions: programs that poll their output for a hang-up would see one.
+        // socket stays open in both directions: programs that poll their output for a hang-up would see one.
         shutdown(&input, Shutdown::Read).context(ACTION)?;
-        for end in [&output, &log] {
-            fd_passing::disable(end.as_fd());
-        }
+        fd_passing::disable(output.as_fd());
         let output_name = socket_name(&stdout).context(ACTION)?;
         Ok(Self {
             lines: LineSocket::new(input, output),
@@ -79,6 +80,16 @@ fn socket_pair() -> io::Result<(OwnedFd, OwnedFd)> {
         SocketFlags::CLOEXEC,
         None,
     )?)
+}
+
+/// The reading end, which never blocks for want of data, and the writing end.
+fn log_pipe() -> io::Result<(OwnedFd, OwnedFd)> {
+    let (reader, writer) = pipe_with(PipeFlags::CLOEXEC)?;
+    ioctl_fionbio(&reader, true)?;
+    fcntl_setpipe_size(&reader, LOG_BUFFER_BYTES)?;
+    // The agent, which may be another user, can open it for writing.
+    fchmod(&writer, Mode::WUSR | Mode::WGRP | Mode::WOTH)?;
+    Ok((reader, writer))
 }
 
 /// The name of a socket in `/proc/*/fd`.

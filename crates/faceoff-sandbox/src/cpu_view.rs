@@ -3,10 +3,7 @@
 //! Libraries count CPUs in `/sys`, in `/proc`, by affinity or by an environment variable, and start a thread for each. If these
 //! counts disagree, threads wait for each other on one CPU, or try to bind to forbidden CPUs and fail.
 
-use crate::{
-    Limits,
-    affinity::{self, cpu_list},
-};
+use crate::{SpawnSpec, affinity::cpu_list, cpu_numbers::CpuNumbers};
 
 /// Files in which libraries read the list of CPUs.
 const CPU_LISTS: [&str; 3] = [
@@ -28,28 +25,27 @@ pub(crate) const THREAD_VARIABLES: [&str; 6] = [
 /// The CPUs of one agent.
 #[derive(Debug)]
 pub(crate) struct CpuView {
-    cpus: Vec<usize>,
+    numbers: CpuNumbers,
     threads: usize,
 }
 
 impl CpuView {
-    /// View of an agent bound to `cpus`. If the list is empty, the agent has the affinity of this process.
-    pub(crate) fn new(cpus: &[usize], limits: &Limits) -> Self {
-        let cpus = match cpus {
-            // A host that does not report its CPUs has at least one.
-            [] => affinity::process_cpus().unwrap_or_else(|_| vec![0]),
-            own => own.to_vec(),
-        };
-        let quota = limits.cpus.ceil().max(1.0) as usize;
+    pub(crate) fn new(spec: &SpawnSpec) -> Self {
+        Self::of(CpuNumbers::new(spec), spec.limits.cpus)
+    }
+
+    /// `quota`: CPU time that the agent may use, in CPUs.
+    fn of(numbers: CpuNumbers, quota: f64) -> Self {
+        let quota = quota.ceil().max(1.0) as usize;
         Self {
-            threads: cpus.len().clamp(1, quota),
-            cpus,
+            threads: numbers.count().clamp(1, quota),
+            numbers,
         }
     }
 
     /// The CPU list files: path and content.
     pub(crate) fn lists(&self) -> impl Iterator<Item = (&'static str, Vec<u8>)> {
-        let list = format!("{}\n", cpu_list(&self.cpus));
+        let list = format!("{}\n", cpu_list(&self.numbers.all()));
         CPU_LISTS
             .map(|path| (path, list.clone().into_bytes()))
             .into_iter()
@@ -63,7 +59,7 @@ impl CpuView {
             .into_iter()
     }
 
-    /// The content of the host's file `path` without the CPUs that the agent may not use.
+    /// The content of the host's file `path` with the agent's CPUs only, and its numbers of them.
     pub(crate) fn filter_file(&self, path: &str, content: &[u8]) -> Vec<u8> {
         let text = || String::from_utf8_lossy(content);
         match path {
@@ -74,25 +70,33 @@ impl CpuView {
     }
 
     fn filter_stat(&self, text: &str) -> String {
-        let is_shown = |line: &&str| {
-            let name = line.split(' ').next().unwrap_or_default();
-            match name.strip_prefix("cpu").map(str::parse) {
-                Some(Ok(cpu)) => self.cpus.contains(&cpu),
-                _ => true,
-            }
+        let filter_line = |line: &str| {
+            let (name, rest) = line.split_once(' ').unwrap_or((line, ""));
+            let Some(Ok(cpu)) = name.strip_prefix("cpu").map(str::parse) else {
+                return Some(line.to_owned());
+            };
+            let cpu = self.numbers.for_agent(cpu)?;
+            Some(format!("cpu{cpu} {rest}"))
         };
-        text.split_inclusive('\n').filter(is_shown).collect()
+        text.split_inclusive('\n').filter_map(filter_line).collect()
     }
 
     fn filter_cpuinfo(&self, text: &str) -> String {
-        let is_shown = |block: &&str| {
-            let number = block.lines().find_map(|line| {
+        let filter_block = |block: &str| {
+            let processor = block.lines().find_map(|line| {
                 let (name, value) = line.split_once(':')?;
-                (name.trim() == "processor").then(|| value.trim().parse().ok())?
+                let number = value.trim().parse().ok()?;
+                (name.trim() == "processor").then_some((line, name, number))
             });
-            number.is_none_or(|cpu| self.cpus.contains(&cpu))
+            let Some((line, name, number)) = processor else {
+                return Some(block.to_owned());
+            };
+            let number = self.numbers.for_agent(number)?;
+            Some(block.replacen(line, &format!("{name}: {number}"), 1))
         };
-        text.split_inclusive("\n\n").filter(is_shown).collect()
+        text.split_inclusive("\n\n")
+            .filter_map(filter_block)
+            .collect()
     }
 }
 
@@ -101,11 +105,7 @@ mod tests {
     use super::*;
 
     fn view(cpus: &[usize], quota: f64) -> CpuView {
-        let limits = Limits {
-            cpus: quota,
-            ..Limits::default()
-        };
-        CpuView::new(cpus, &limits)
+        CpuView::of(CpuNumbers::of(cpus, true), quota)
     }
 
     #[test]
@@ -132,16 +132,16 @@ mod tests {
         let view = view(&[1, 10], 2.0);
         let stat = "cpu  9 9\ncpu0 1 1\ncpu1 2 2\ncpu10 3 3\ncpu11 4 4\nintr 5\nctxt 6\n";
         let shown = String::from_utf8(view.filter_file("/proc/stat", stat.as_bytes())).unwrap();
-        assert_eq!(shown, "cpu  9 9\ncpu1 2 2\ncpu10 3 3\nintr 5\nctxt 6\n");
+        assert_eq!(shown, "cpu  9 9\ncpu0 2 2\ncpu1 3 3\nintr 5\nctxt 6\n");
         let info = "processor\t: 0\nmodel name\t: x\n\nprocessor\t: 1\nmodel name\t: x\n\n\
                     processor\t: 10\nflags\t\t: fpu\n\nHardware\t: board\n";
         let shown = String::from_utf8(view.filter_file("/proc/cpuinfo", info.as_bytes())).unwrap();
         assert_eq!(
             shown,
-            "processor\t: 1\nmodel name\t: x\n\nprocessor\t: 10\nflags\t\t: fpu\n\nHardware\t: board\n"
+            "processor\t: 0\nmodel name\t: x\n\nprocessor\t: 1\nflags\t\t: fpu\n\nHardware\t: board\n"
         );
         assert_eq!(view.filter_file("/proc/uptime", b"1 2\n"), b"1 2\n");
         let lists: Vec<_> = view.lists().map(|(_, list)| list).collect();
-        assert_eq!(lists, [b"1,10\n", b"1,10\n", b"1,10\n"]);
+        assert_eq!(lists, [b"0,1\n", b"0,1\n", b"0,1\n"]);
     }
 }

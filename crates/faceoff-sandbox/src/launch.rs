@@ -72,8 +72,9 @@ impl Launch {
         let cgroup = AgentCgroup::create(&spec.limits, &spec.isolation, &spec.cpus)?;
         let is_confined = cgroup.as_ref().is_some_and(|cgroup| cgroup.confines_cpus);
         let (filters, answered_calls, answerer) = if enforces(Layer::Seccomp) {
-            let (calls, answerer) = AnsweredCalls::new(spec.limits.scratch_bytes)?;
-            let filters = Filters::build(!spec.cpus.is_empty() && !is_confined)?;
+            let (calls, answerer) = AnsweredCalls::new(spec)?;
+            let has_own_network = enforces(Layer::Namespaces);
+            let filters = Filters::build(has_own_network, !spec.cpus.is_empty() && !is_confined)?;
             (Some(filters), Some(calls), Some(answerer))
         } else {
             (None, None, None)

@@ -1,6 +1,6 @@
 //! Detects an agent that has closed its standard output and still runs.
 //!
-//! bubblewrap's own process inherits the file descriptor of the output and keeps it open as long as it lives. So the kernel reports no
+//! bubblewrap's own processes inherit the file descriptor of the output and keep it open as long as they live. So the kernel reports no
 //! end of file when the agent closes its output. `/proc` shows which other processes have the output open.
 
 use rustix::process::Pid;
@@ -10,10 +10,15 @@ use std::{fs, io};
 /// more descriptors counts as still having its output open.
 const MAX_DESCRIPTORS: usize = 4096;
 
-/// Does a process of `tree` other than `bubblewrap` have a descriptor that `/proc` names `output`? Also `true` if this is unknown;
+/// Does a process of `tree` other than `helpers` (bubblewrap's) have a descriptor that `/proc` names `output`? Also `true` if this is unknown;
 /// then the service waits until the deadline of the answer.
-pub(crate) fn is_open_in_tree(output: &str, tree: &[Pid], bubblewrap: Pid) -> bool {
-    let others: Vec<_> = tree.iter().filter(|pid| **pid != bubblewrap).collect();
+pub(crate) fn is_open_in_tree(
+    output: &str,
+    tree: &[Pid],
+    helpers: impl Iterator<Item = Pid>,
+) -> bool {
+    let helpers: Vec<_> = helpers.collect();
+    let others: Vec<_> = tree.iter().filter(|pid| !helpers.contains(pid)).collect();
     let mut remaining = MAX_DESCRIPTORS;
     others.is_empty()
         || others.into_iter().any(|pid| {

@@ -6,13 +6,13 @@
 
 use crate::{SandboxError, error::IoContext};
 use rustix::{
-    fs::{AtFlags, CWD, Mode, chmodat},
-    io::Errno,
+    fs::{AtFlags, CWD, Mode, OFlags, chmodat, open},
+    io::{Errno, write},
     net::{AddressFamily, SocketFlags, SocketType, socket_with},
     thread::{UnshareFlags, unshare_unsafe},
 };
 use std::{
-    ffi::CString,
+    ffi::{CStr, CString},
     fs, io,
     mem::MaybeUninit,
     os::{fd::AsRawFd, unix::ffi::OsStrExt},
@@ -21,6 +21,12 @@ use std::{
 const FOLDER: &str = "/proc/self/net";
 /// Files that show the namespace's own state only, and that programs read to list interfaces.
 const OPEN_FILES: [&str; 4] = ["dev", "if_inet6", "ipv6_route", "route"];
+
+/// Buffers of a connection: least, usual and most bytes. All networks of the host share the memory for them.
+const BUFFER_LIMITS: &[(&CStr, &[u8])] = &[
+    (c"/proc/sys/net/ipv4/tcp_rmem", b"4096 131072 262144"),
+    (c"/proc/sys/net/ipv4/tcp_wmem", b"4096 16384 262144"),
+];
 
 /// The network of one agent.
 #[derive(Debug)]
@@ -46,6 +52,11 @@ impl PrivateNetwork {
             unshare_unsafe(UnshareFlags::NEWNET)?;
         }
         start_loopback()?;
+        for (setting, value) in BUFFER_LIMITS {
+            // Best effort, since a container may have a read-only `/proc/sys`; the number of sockets is limited, too.
+            let file = open(*setting, OFlags::WRONLY | OFlags::CLOEXEC, Mode::empty());
+            let _ = file.and_then(|file| write(&file, value));
+        }
         for file in &self.closed_files {
             match chmodat(CWD, file, Mode::empty(), AtFlags::empty()) {
                 // A module of the kernel may have been loaded or unloaded since the names were read.

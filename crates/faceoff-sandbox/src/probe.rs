@@ -87,9 +87,9 @@ fn probe_namespaces() -> Result<String, String> {
     // Its cure is reported separately.
     BubblewrapProgram::find().map_err(|problem| problem.to_string())?;
     let bubblewrap = Bubblewrap::find().map_err(|error| error.to_string())?;
-    // Inside, the process is number one, has no capabilities, and sees only its own network.
+    // Inside, the process is the second one, has no capabilities, and sees only its own network.
     let status = run_cat(Layer::Namespaces, "/proc/self/status")?;
-    if field(&status, "Pid:") != Some("1") || field(&status, "CapBnd:") != Some("0000000000000000")
+    if field(&status, "Pid:") != Some("2") || field(&status, "CapBnd:") != Some("0000000000000000")
     {
         return Err(format!(
             "{} ran, but without namespaces of its own",

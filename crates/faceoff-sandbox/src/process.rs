@@ -386,7 +386,7 @@ impl AgentProcess {
         let is_open = open_output::is_open_in_tree(
             &self.output_name,
             &self.tree.processes(),
-            self.tree.pid(),
+            self.tree.helpers(),
         );
         if is_open {
             return Ok(false);

@@ -33,6 +33,8 @@ pub(crate) struct ProcessTree {
     child_pidfd: OwnedFd,
     /// Pidfd of the sandbox's first process, whose end terminates all others in the sandbox.
     sandbox_init: Option<OwnedFd>,
+    /// Its number on the host.
+    init_pid: Option<Pid>,
     pub(crate) status: Option<StatusPipe>,
     pub(crate) cgroup: Option<AgentCgroup>,
     /// Answers some system calls of the tree.
@@ -56,6 +58,7 @@ impl ProcessTree {
                 child,
                 child_pidfd,
                 sandbox_init: None,
+                init_pid: None,
                 status,
                 cgroup,
                 answer_thread: None,
@@ -80,11 +83,18 @@ impl ProcessTree {
         let parent = parent_and_group(pid.as_raw_nonzero().get()).map(|(parent, _)| parent);
         if parent == Some(self.pid().as_raw_nonzero().get()) {
             self.sandbox_init = Some(init);
+            self.init_pid = Some(pid);
         }
     }
 
     pub(crate) fn pid(&self) -> Pid {
         Pid::from_child(&self.child)
+    }
+
+    /// The processes of the tree that are bubblewrap's: its own, and the sandbox's first one.
+    pub(crate) fn helpers(&self) -> impl Iterator<Item = Pid> {
+        let own = self.is_sandboxed().then(|| self.pid());
+        own.into_iter().chain(self.init_pid)
     }
 
     /// CPU time of the tree so far, in seconds.
@@ -120,8 +130,26 @@ impl ProcessTree {
             // The child is not reaped yet, so its pid and its process group id cannot have been reused.
             self.kill_relatives();
             self.exit_status = Some(self.child.wait()?);
+            self.end_sandbox();
         }
         Ok(self.exit_status)
+    }
+
+    /// Ends the sandbox's first process, and with it all others, after bubblewrap has ended with the agent. The kernel would do it, too, but
+    /// a moment later.
+    fn end_sandbox(&self) {
+        let Some(init) = &self.sandbox_init else {
+            return;
+        };
+        let _ = pidfd_send_signal(init, Signal::KILL);
+        self.thaw();
+        let deadline = Instant::now() + KILL_TIMEOUT;
+        if !matches!(wait_for(init.as_fd(), PollFlags::IN, deadline), Ok(true)) {
+            tracing::error!(
+                pid = self.child.id(),
+                "an agent's sandbox did not end after SIGKILL"
+            );
+        }
     }
 
     /// Kills every process of the tree and reaps the child.

@@ -101,8 +101,6 @@ const REFUSED_ON_THIS_ARCH: &[i64] = &[];
 
 /// Answered as by a kernel that lacks them (`ENOSYS`).
 const ABSENT: &[i64] = &[
-    // locks on a shared file are visible to all agents; for locks by `fcntl` see `UNKNOWN_REQUESTS`
-    libc::SYS_flock,
     // reports other agents' accesses to a file
     libc::SYS_inotify_init1,
     // show which pages of a file are in memory, and so what other agents have read
@@ -125,10 +123,23 @@ const ABSENT: &[i64] = &[
 const STATMOUNT: i64 = 457;
 const LISTMOUNT: i64 = 458;
 
-/// Socket options that are answered as if the kernel did not know them: numbers that are counted for the whole host, and descriptors of
-/// processes.
-const UNKNOWN_SOCKET_OPTIONS: [libc::c_int; 4] =
-    [libc::SO_COOKIE, SO_NETNS_COOKIE, SO_PASSPIDFD, SO_PEERPIDFD];
+/// Socket options, with their levels, that are answered as if the kernel did not know them: numbers that are counted for the whole host,
+/// descriptors of processes, and labels of which the whole host has a limited number.
+const UNKNOWN_SOCKET_OPTIONS: [(libc::c_int, libc::c_int); 5] = [
+    (libc::SOL_SOCKET, libc::SO_COOKIE),
+    (libc::SOL_SOCKET, SO_NETNS_COOKIE),
+    (libc::SOL_SOCKET, SO_PASSPIDFD),
+    (libc::SOL_SOCKET, SO_PEERPIDFD),
+    (libc::IPPROTO_IPV6, IPV6_FLOWLABEL_MGR),
+];
+const IPV6_FLOWLABEL_MGR: libc::c_int = 32;
+/// Sizes of sockets' buffers.
+const BUFFER_SIZES: [(libc::c_int, libc::c_int); 4] = [
+    (libc::SOL_SOCKET, libc::SO_SNDBUF),
+    (libc::SOL_SOCKET, libc::SO_SNDBUFFORCE),
+    (libc::SOL_SOCKET, libc::SO_RCVBUF),
+    (libc::SOL_SOCKET, libc::SO_RCVBUFFORCE),
+];
 const SO_NETNS_COOKIE: libc::c_int = 71;
 const SO_PASSPIDFD: libc::c_int = 76;
 const SO_PEERPIDFD: libc::c_int = 77;
@@ -204,18 +215,27 @@ pub(crate) struct Filters(Vec<BpfProgram>);
 type Rules = BTreeMap<i64, Vec<SeccompRule>>;
 
 impl Filters {
-    /// `refuse_affinity_changes`: also refuses to change the CPU affinity, for hosts where no cpuset confines the agent.
-    pub(crate) fn build(refuse_affinity_changes: bool) -> Result<Self, SandboxError> {
+    /// `has_own_network`: is the agent in a network namespace of its own? `refuse_affinity_changes`: also refuses to change the CPU affinity,
+    /// for hosts where no cpuset confines the agent.
+    pub(crate) fn build(
+        has_own_network: bool,
+        refuse_affinity_changes: bool,
+    ) -> Result<Self, SandboxError> {
         let mut rules = any_arguments(&[REFUSED, REFUSED_ON_THIS_ARCH]);
         if refuse_affinity_changes {
             rules.insert(libc::SYS_sched_setaffinity, Vec::new());
         }
         rules.insert(libc::SYS_clone, namespace_rules()?);
-        // Only AF_UNIX sockets: they reach nothing outside the sandbox, because no socket path of the host is
-        // mounted, and abstract names belong to the network namespace.
+        // Local sockets reach nothing outside the sandbox, because no socket path of the host is mounted, and abstract names belong to the
+        // network namespace.
         let not_unix = vec![rule([argument(0, SeccompCmpOp::Ne, libc::AF_UNIX)])?];
-        rules.insert(libc::SYS_socket, not_unix.clone());
-        rules.insert(libc::SYS_socketpair, not_unix);
+        rules.insert(libc::SYS_socketpair, not_unix.clone());
+        let sockets = if has_own_network {
+            refused_sockets()?
+        } else {
+            not_unix
+        };
+        rules.insert(libc::SYS_socket, sockets);
         // These requests push input into a terminal.
         let terminal = [libc::TIOCSTI, libc::TIOCLINUX].map(|request| request as libc::c_int);
         rules.insert(libc::SYS_ioctl, one_of(1, &terminal)?);
@@ -225,15 +245,9 @@ impl Filters {
         let mut ignored = any_arguments(&[IGNORED]);
         ignored.insert(libc::SYS_madvise, one_of(2, &IGNORED_ADVICE)?);
         ignored.insert(libc::SYS_fcntl, one_of(1, &[libc::F_GETLK])?);
-        // An agent must not choose how much of its log can be unread. The call succeeds without effect: libraries
-        // set a buffer size and do not check it.
-        let buffer_size = [libc::SO_SNDBUF, libc::SO_SNDBUFFORCE].map(|option| {
-            rule([
-                argument(1, SeccompCmpOp::Eq, libc::SOL_SOCKET),
-                argument(2, SeccompCmpOp::Eq, option),
-            ])
-        });
-        let buffer_size = buffer_size.into_iter().collect::<Result<Vec<_>, _>>()?;
+        // An agent must not choose how much of its log can be unread, nor how much of the host's memory for networks its sockets take. The
+        // call succeeds without effect: libraries set a buffer size and do not check it.
+        let buffer_size = socket_options(&BUFFER_SIZES)?;
         ignored.insert(libc::SYS_setsockopt, buffer_size);
         let mut unknown_requests = Rules::new();
         unknown_requests.insert(libc::SYS_fcntl, one_of(1, &UNKNOWN_REQUESTS)?);
@@ -255,13 +269,7 @@ impl Filters {
             libc::SYS_bind,
             one_of(2, &[size_of::<libc::sa_family_t>() as libc::c_int])?,
         );
-        let options = UNKNOWN_SOCKET_OPTIONS.map(|option| {
-            rule([
-                argument(1, SeccompCmpOp::Eq, libc::SOL_SOCKET),
-                argument(2, SeccompCmpOp::Eq, option),
-            ])
-        });
-        let options = options.into_iter().collect::<Result<Vec<_>, _>>()?;
+        let options = socket_options(&UNKNOWN_SOCKET_OPTIONS)?;
         let unknown_options = Rules::from([
             (libc::SYS_getsockopt, options.clone()),
             (libc::SYS_setsockopt, options),
@@ -300,11 +308,14 @@ fn any_arguments(lists: &[&[i64]]) -> Rules {
     calls.map(|&call| (call, Vec::new())).collect()
 }
 
-/// The filter that passes calls to the service, which answers them ([`crate::answered_calls`]).
-pub(crate) fn answered_calls() -> Result<BpfProgram, SandboxError> {
+/// The filter that passes calls to the service, which answers them ([`crate::answered_calls`]). `renumbers_cpus`: those about affinities, too.
+pub(crate) fn answered_calls(renumbers_cpus: bool) -> Result<BpfProgram, SandboxError> {
     // The compiler has no such answer, so its answer of another kind is replaced.
     const PLACEHOLDER: u32 = 4095;
-    let mut program = compile(any_arguments(&[ANSWERED]), PLACEHOLDER.cast_signed())?;
+    let affinity: &[i64] = if renumbers_cpus { AFFINITY } else { &[] };
+    let mut rules = any_arguments(&[ANSWERED, affinity]);
+    rules.insert(libc::SYS_socket, one_of(0, &INTERNET)?);
+    let mut program = compile(rules, PLACEHOLDER.cast_signed())?;
     for instruction in &mut program {
         if instruction.k == libc::SECCOMP_RET_ERRNO | PLACEHOLDER {
             instruction.k = libc::SECCOMP_RET_USER_NOTIF;
@@ -319,7 +330,57 @@ const ANSWERED: &[i64] = &[
     libc::SYS_fstatfs,
     libc::SYS_sysinfo,
     libc::SYS_setsid,
+    // whether the file is the agent's own is not in the arguments
+    libc::SYS_flock,
 ];
+/// Calls that contain numbers of CPUs.
+const AFFINITY: &[i64] = &[libc::SYS_sched_getaffinity, libc::SYS_sched_setaffinity];
+
+/// The families of sockets of the internet.
+const INTERNET: [libc::c_int; 2] = [libc::AF_INET, libc::AF_INET6];
+/// The only further family beside local sockets: programs list the interfaces of their own network by it.
+const NETLINK: libc::c_int = libc::AF_NETLINK;
+/// Types of sockets (the lower four bits of the argument) of which the kernel would load modules, or that need rights.
+const REFUSED_TYPES: [libc::c_int; 4] = [
+    libc::SOCK_RAW,
+    libc::SOCK_SEQPACKET,
+    libc::SOCK_DCCP,
+    SOCK_PACKET,
+];
+/// Deprecated in `libc`, since it is superseded.
+const SOCK_PACKET: libc::c_int = 10;
+const SOCKET_TYPE: u64 = 0xf;
+
+/// Sockets that are refused. Those of the internet reach the agent's own network only, in which nobody else is.
+fn refused_sockets() -> Result<Vec<SeccompRule>, SandboxError> {
+    let families = [libc::AF_UNIX, NETLINK, INTERNET[0], INTERNET[1]];
+    let other = families.map(|family| argument(0, SeccompCmpOp::Ne, family));
+    // Routing only, which is protocol 0.
+    let other_netlink = [
+        argument(0, SeccompCmpOp::Eq, NETLINK),
+        argument(2, SeccompCmpOp::Ne, libc::NETLINK_ROUTE),
+    ];
+    let mut rules = vec![rule(other)?, rule(other_netlink)?];
+    let of_type = |kind| argument(1, SeccompCmpOp::MaskedEq(SOCKET_TYPE), kind);
+    for family in INTERNET {
+        let of_family = || argument(0, SeccompCmpOp::Eq, family);
+        for kind in REFUSED_TYPES {
+            rules.push(rule([of_family(), of_type(kind)])?);
+        }
+        for (kind, protocol) in [
+            (libc::SOCK_STREAM, libc::IPPROTO_TCP),
+            (libc::SOCK_DGRAM, libc::IPPROTO_UDP),
+        ] {
+            rules.push(rule([
+                of_family(),
+                of_type(kind),
+                argument(2, SeccompCmpOp::Ne, libc::IPPROTO_IP),
+                argument(2, SeccompCmpOp::Ne, protocol),
+            ])?);
+        }
+    }
+    Ok(rules)
+}
 
 /// Compiles a filter that answers the calls of `rules` with `errno`; 0 is success.
 fn compile(rules: Rules, errno: libc::c_int) -> Result<BpfProgram, SandboxError> {
@@ -348,6 +409,19 @@ fn one_of(index: u8, values: &[libc::c_int]) -> Result<Vec<SeccompRule>, Sandbox
     rules.collect()
 }
 
+/// Rules that match a call with the level and the name of an option of sockets.
+fn socket_options(
+    options: &[(libc::c_int, libc::c_int)],
+) -> Result<Vec<SeccompRule>, SandboxError> {
+    let rules = options.iter().map(|&(level, name)| {
+        rule([
+            argument(1, SeccompCmpOp::Eq, level),
+            argument(2, SeccompCmpOp::Eq, name),
+        ])
+    });
+    rules.collect()
+}
+
 /// Rules that match `clone` with a flag that creates a namespace.
 fn namespace_rules() -> Result<Vec<SeccompRule>, SandboxError> {
     let rules = NAMESPACE_FLAGS.iter().map(|&flag| {
@@ -369,9 +443,9 @@ fn rule<const N: usize>(
 
 /// Answers `ENOSYS` to `clone3` and to every number above [`NEWEST_KNOWN`], including the x32 calls (bit 30).
 ///
-/// `prctl(PR_SET_PDEATHSIG)` succeeds without effect. The agent is its sandbox's first process and could
-/// otherwise outlive the service. The call must not fail, because libraries use it for their own children,
-/// which end with the agent in any case.
+/// `prctl(PR_SET_PDEATHSIG)` succeeds without effect: the sandbox's first process ends with the service by this signal, and an agent without
+/// namespaces could otherwise outlive it. The call must not fail, because libraries use it for their own children, which end with the
+/// agent in any case.
 ///
 /// The other filters refuse foreign architectures, so this one does not check the architecture.
 fn filter_unknown_calls() -> BpfProgram {

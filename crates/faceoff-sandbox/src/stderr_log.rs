@@ -3,8 +3,7 @@
 use crate::{bounded_log::BoundedLog, cpu_clock::own_cpu_time, sched_stat::SchedStat};
 use rustix::{
     event::{PollFd, PollFlags, poll},
-    io::{Errno, ioctl_fionread},
-    net::{RecvFlags, recv},
+    io::{Errno, ioctl_fionread, read},
     pipe::{PipeFlags, pipe_with},
 };
 use std::{
@@ -18,13 +17,16 @@ use std::{
 
 const CHUNK_BYTES: usize = 64 << 10;
 /// Minimum pause after a read. A flood, even one byte at a time, wakes the service at most a thousand times a
-/// second, and only the flooding agent blocks. The socket's buffer bridges the pause.
+/// second, and only the flooding agent blocks. The pipe's buffer bridges the pause.
 const PAUSE: Duration = Duration::from_millis(1);
 /// The pause is at least this multiple of the CPU time of the read. An agent that polls the other end through a
 /// hundred thousand descriptors makes each read expensive.
 const PAUSE_PER_CPU_TIME: u32 = 20;
 /// CPU time of one read above which the log is not read any further.
 const MAX_READ_CPU_TIME: Duration = Duration::from_millis(20);
+
+/// How long to wait for the thread to end.
+const END_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// The thread that reads standard error, and the part that it keeps.
 #[derive(Debug)]
@@ -33,28 +35,33 @@ pub(crate) struct StderrLog {
     /// The kernel's scheduling counters of the thread.
     schedule: Option<File>,
     thread: Option<JoinHandle<()>>,
+    /// Closed by the thread at its end.
+    ended: mpsc::Receiver<()>,
     /// Dropped to stop the thread even if a process still has the agent's end open.
     stop: Option<OwnedFd>,
 }
 
 impl StderrLog {
-    /// Starts a thread that reads the socket `log` and keeps at most `max_bytes` of it.
+    /// Starts a thread that reads the pipe `log` and keeps at most `max_bytes` of it.
     pub(crate) fn drain(log: OwnedFd, max_bytes: u64) -> io::Result<Self> {
         let (stop_reader, stop) = pipe_with(PipeFlags::CLOEXEC)?;
         let kept = Arc::new(Mutex::new(BoundedLog::new(max_bytes)));
         let shared = Arc::clone(&kept);
         let (sender, receiver) = mpsc::channel();
+        let (end, ended) = mpsc::channel();
         let thread = std::thread::Builder::new()
             .name("agent-stderr".into())
             .spawn(move || {
                 let _ = sender.send(File::open("/proc/thread-self/schedstat").ok());
                 drop(sender);
                 drain_until_closed(&log, &stop_reader, &shared);
+                drop(end);
             })?;
         Ok(Self {
             kept,
             schedule: receiver.recv().ok().flatten(),
             thread: Some(thread),
+            ended,
             stop: Some(stop),
         })
     }
@@ -70,12 +77,18 @@ impl StderrLog {
         file.and_then(SchedStat::read).unwrap_or_default().run_time
     }
 
-    /// Reads the remaining bytes and ends the thread. Call it when the process tree is dead.
+    /// Reads the remaining bytes and ends the thread. Call it when the process tree is dead: a process that has escaped, which only
+    /// namespaces prevent, could hold the lock of the pipe, and the thread with it.
     pub(crate) fn close(&mut self) {
         drop(self.stop.take());
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
+        let Some(thread) = self.thread.take() else {
+            return;
+        };
+        if self.ended.recv_timeout(END_TIMEOUT) == Err(mpsc::RecvTimeoutError::Timeout) {
+            tracing::error!("a process of an agent that has ended still holds its log");
+            return;
         }
+        let _ = thread.join();
     }
 }
 
@@ -92,7 +105,7 @@ fn lock(kept: &Mutex<BoundedLog>) -> MutexGuard<'_, BoundedLog> {
 fn drain_until_closed(log: &OwnedFd, stop: &OwnedFd, kept: &Mutex<BoundedLog>) {
     let mut chunk = vec![0; CHUNK_BYTES];
     let keep = |bytes: &[u8]| lock(kept).push(bytes);
-    // Larger than what a socket can hold after its writers have died. If a writer survives and goes on writing, reading ends here.
+    // Larger than what a pipe can hold after its writers have died. If a writer survives and goes on writing, reading ends here.
     let mut remaining_bytes_after_stop = 1 << 20;
     loop {
         let mut fds = [
@@ -110,9 +123,9 @@ fn drain_until_closed(log: &OwnedFd, stop: &OwnedFd, kept: &Mutex<BoundedLog>) {
             .unwrap_or(CHUNK_BYTES)
             .clamp(1, CHUNK_BYTES);
         let cpu_time_before = own_cpu_time();
-        match recv(log, &mut chunk[..limit], RecvFlags::DONTWAIT) {
-            Ok((0, _)) => return,
-            Ok((count, _)) => {
+        match read(log, &mut chunk[..limit]) {
+            Ok(0) => return,
+            Ok(count) => {
                 keep(&chunk[..count]);
                 let cpu_time = own_cpu_time().saturating_sub(cpu_time_before);
                 if is_stopped {

@@ -24,8 +24,8 @@ use std::{
 const CPU_PERIOD_US: u64 = 10_000;
 /// The kernel charges memory in batches, so the peak may stay this far below the limit.
 const PEAK_SLACK_BYTES: u64 = 1 << 20;
-/// bubblewrap's own process is in the agent's cgroup.
-const BUBBLEWRAP_PROCESSES: u64 = 1;
+/// bubblewrap's own process and the sandbox's first one are in the agent's cgroup.
+const BUBBLEWRAP_PROCESSES: u64 = 2;
 
 /// A limit that the tree reached, according to the kernel's counters.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -27,7 +27,7 @@ const REFUSED: [(&str, &[&str]); 6] = [
     (
         "ENOSYS",
         &[
-            "flock",
+            "exclusive_lock_of_file",
             "inotify_init",
             "inotify_init1",
             "asynchronous_slots",
@@ -64,8 +64,9 @@ const REFUSED: [(&str, &[&str]); 6] = [
 
 /// Calls that seem to work: a lock that no other agent can see, a lock query without an answer, and advice without
 /// effect.
-const WITHOUT_EFFECT: [&str; 7] = [
+const WITHOUT_EFFECT: [&str; 8] = [
     "lock",
+    "shared_lock_of_file",
     "lock_query",
     "advice_will_need",
     "advice_do_not_need",

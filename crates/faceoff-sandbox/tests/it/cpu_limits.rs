@@ -1,7 +1,8 @@
 //! CPU limits: an agent stays on its CPUs, within its quota, and its CPU time is measured.
 
-use crate::harness::{Subject, expect_echo, expect_line, has_layer};
+use crate::harness::{Subject, expect_echo, expect_line, has_layer, processes_marked};
 use faceoff_sandbox::{Layer, affinity};
+use std::fs;
 
 #[test]
 fn agent_stays_on_its_cpus_and_is_accounted() {
@@ -11,8 +12,16 @@ fn agent_stays_on_its_cpus_and_is_accounted() {
     subject.spec.cpus = vec![cpu];
     let mut agent = subject.spawn();
     let report: serde_json::Value = serde_json::from_str(&expect_line(&mut agent)).unwrap();
-    assert_eq!(report["before"], serde_json::json!([cpu]));
-    assert_eq!(report["after"], serde_json::json!([cpu]), "{report}");
+    // The agent's own number of its only CPU is 0.
+    assert_eq!(report["before"], serde_json::json!([0]));
+    assert_eq!(report["after"], serde_json::json!([0]), "{report}");
+    let processes = processes_marked(&subject.mark);
+    assert!(!processes.is_empty());
+    for pid in processes {
+        let status = fs::read_to_string(format!("/proc/{pid}/status")).unwrap();
+        let on_host = format!("Cpus_allowed_list:\t{cpu}\n");
+        assert!(status.contains(&on_host), "{status}");
+    }
     if has_layer(Layer::CgroupCpu) {
         let used = agent.cpu_time_s().unwrap();
         // The test agent computes for this long before it answers.

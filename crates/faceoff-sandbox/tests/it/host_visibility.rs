@@ -56,14 +56,34 @@ fn agent_sees_only_its_bundle_and_runtime() {
     ];
     assert_eq!(names("environment"), expected);
     assert_eq!(names("environs"), expected);
-    // It is the first and only process: no process of bubblewrap is inside.
-    assert_eq!(report["processes"], serde_json::json!(["1"]));
+    // The first process is bubblewrap's, which reaps others.
+    assert_eq!(report["processes"], serde_json::json!(["1", "2"]));
+    let init = &report["init"];
+    assert_eq!(init["capabilities"], "0000000000000000");
+    assert_eq!(init["filters"], report["status"]["Seccomp_filters"]);
+    let command_line = init["command_line"].as_str().unwrap();
+    let words: Vec<_> = command_line.split(' ').collect();
+    assert_eq!(
+        (words[1], &words[3..6]),
+        ("--args", &["--", "python3", "reads_host.py"][..])
+    );
+    let bundle = subject.bundle.path().to_str().unwrap();
+    assert!(!command_line.contains(bundle), "{command_line}");
     assert_eq!(report["directory"], "/agent");
     assert_eq!(report["bundle"], serde_json::json!(["reads_host.py"]));
     assert_eq!(report["passwd"], "agent:x:1000:1000:agent:/tmp:/bin/sh\n");
     for entry in report["etc"].as_array().unwrap() {
         assert!(
-            ["group", "passwd", "ld.so.cache"].contains(&entry.as_str().unwrap()),
+            [
+                "alternatives",
+                "group",
+                "hostname",
+                "hosts",
+                "ld.so.cache",
+                "nsswitch.conf",
+                "passwd"
+            ]
+            .contains(&entry.as_str().unwrap()),
             "{entry}"
         );
     }
@@ -94,11 +114,9 @@ fn agent_has_no_rights_terminal_or_extra_descriptors() {
     assert_eq!(report["terminal"], serde_json::Value::Null);
     assert_eq!(report["session_is_own"], true);
     assert_eq!(report["other_descriptors"], serde_json::json!([]));
-    for descriptor in report["descriptors"].as_array().unwrap() {
-        assert!(
-            descriptor.as_str().unwrap().starts_with("socket:"),
-            "{descriptor}"
-        );
+    for (descriptor, kind) in ["socket:", "socket:", "pipe:"].into_iter().enumerate() {
+        let found = report["descriptors"][descriptor].as_str().unwrap();
+        assert!(found.starts_with(kind), "{descriptor}: {found}");
     }
 }
 

@@ -210,15 +210,15 @@ fn image_has_the_limits_of_any_agent() {
     let mut agent = subject.spawn();
     assert_eq!(expect_line(&mut agent), "full");
     subject.finish(agent);
-    // The agent is the only process, the first one, without network and without rights.
+    // The agent is the only process beside the sandbox's first one, without network and without rights.
     let output = root.output(
         "echo $$; echo /proc/[0-9]*; while read -r a b; do case $a in CapEff:|CapBnd:|NoNewPrivs:|Seccomp:) \
          echo $a $b;; esac; done < /proc/self/status\n\
          while read -r a b; do case $a in *:) echo $a;; esac; done < /proc/net/dev",
     );
     let last = &output[output.len() - 5..];
-    assert_eq!(output[0], "1");
-    assert_eq!(output[1], "/proc/1");
+    assert_eq!(output[0], "2");
+    assert_eq!(output[1], "/proc/1 /proc/2");
     assert!(
         last.contains(&"CapEff: 0000000000000000".to_owned()),
         "{output:?}"

@@ -30,3 +30,4 @@ mod process_limits;
 mod resource_limits;
 mod runtimes;
 mod system_calls;
+mod system_use;

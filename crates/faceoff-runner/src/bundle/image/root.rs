@@ -27,7 +27,7 @@ const SANDBOX_FOLDERS: [&str; 5] = ["dev", "proc", "run", "sys", "tmp"];
 const SANDBOX_FILES: [(&str, &str); 5] = [
     ("group", ""),
     ("hostname", "agent\n"),
-    ("hosts", "127.0.0.1 localhost\n::1 localhost\n"),
+    ("hosts", faceoff_sandbox::HOSTS),
     ("passwd", ""),
     ("resolv.conf", ""),
 ];
