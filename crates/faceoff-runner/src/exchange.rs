@@ -18,7 +18,7 @@ use faceoff_sandbox::{
     WriteError, affinity,
 };
 use faceoff_types::{AgentFaultKind, Phase, TimeLimits};
-use faceoff_wire::{MAX_LINE_BYTES, Message, answer, quote_line};
+use faceoff_wire::{MAX_LINE_BYTES, Message, StandardOutput, answer, quote_line};
 use std::{
     sync::Arc,
     time::{Duration, Instant},
@@ -103,6 +103,7 @@ impl<'w> Exchange<'w> {
             bundle_dir: bundle.dir.clone(),
             command: manifest.command.clone(),
             env: variables,
+            logs_output: manifest.stdout == StandardOutput::Log,
             runtime,
             limits: env.limits.clone(),
             isolation: env.isolation.clone(),

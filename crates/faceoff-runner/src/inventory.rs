@@ -99,6 +99,7 @@ fn first_line(
         bundle_dir: bundle.path().to_owned(),
         command: command.iter().map(|&word| word.to_owned()).collect(),
         env: BTreeMap::new(),
+        logs_output: false,
         runtime: runtime.clone(),
         limits: env.limits.clone(),
         isolation: env.isolation.clone(),

@@ -35,6 +35,7 @@ fn bench_start(criterion: &mut Criterion) {
             bundle_dir: bundle.path().to_owned(),
             command: vec![PROGRAM.to_owned(), "ready".to_owned()],
             env: BTreeMap::new(),
+            logs_output: false,
             runtime: runtime.clone(),
             limits: Limits::default(),
             isolation,

@@ -2,7 +2,7 @@
 
 use crate::{
     Limits, agent_user::AgentUser, answered_calls::AnsweredCalls, private_mounts::PrivateMounts,
-    private_network::PrivateNetwork, seccomp::Filters,
+    private_network::PrivateNetwork, protocol_descriptors::ProtocolDescriptors, seccomp::Filters,
 };
 use rustix::{
     fs::{Mode, OFlags, open},
@@ -31,6 +31,8 @@ pub(crate) struct ChildSetup {
     pub network: Option<PrivateNetwork>,
     /// The user that the child becomes.
     pub user: Option<AgentUser>,
+    /// The protocol's descriptors, if they are not standard input and output.
+    pub protocol: Option<ProtocolDescriptors>,
     /// File descriptors that stay open after the exec.
     pub inherited_fds: Vec<OwnedFd>,
     /// The filter of the calls that the service answers.
@@ -91,7 +93,7 @@ impl Step {
             }
             Self::SetRlimits => "cannot set the agent's resource limits",
             Self::BecomeUser => "cannot become the agent's user",
-            Self::PassDescriptors => "cannot pass a descriptor to bubblewrap",
+            Self::PassDescriptors => "cannot pass descriptors to the agent",
             Self::DieWithParent => "cannot tie the agent to the service",
             Self::AnswerCalls => {
                 "cannot install the seccomp filter whose calls the service answers (no other program may have installed one \
@@ -178,6 +180,11 @@ impl ChildSetup {
         if let Some(user) = self.user {
             user.switch_to()
                 .map_err(|error| (Step::BecomeUser, error))?;
+        }
+        if let Some(protocol) = &self.protocol {
+            protocol
+                .pass()
+                .map_err(|error| (Step::PassDescriptors, error))?;
         }
         for fd in &self.inherited_fds {
             fcntl_setfd(fd, FdFlags::empty()).map_err(|error| (Step::PassDescriptors, error))?;

@@ -13,6 +13,7 @@ use crate::{
     line_socket::LineSocket,
     owner::Owner,
     process_tree::ProcessTree,
+    protocol_descriptors::ProtocolDescriptors,
     seccomp::Filters,
     spawner,
     status_pipe::StatusPipe,
@@ -24,7 +25,7 @@ use std::{
     fs, io,
     os::unix::{fs::PermissionsExt, process::CommandExt},
     path::{Path, PathBuf},
-    process::Command,
+    process::{Command, Stdio},
     time::{Duration, Instant},
 };
 
@@ -62,6 +63,9 @@ impl Launch {
                       which only this layer can do; enable the layer"
                     .to_owned(),
             });
+        }
+        if spec.logs_output {
+            ProtocolDescriptors::reserve()?;
         }
         if spec.isolation == Isolation::None {
             return Self::unsandboxed(spec);
@@ -158,7 +162,7 @@ impl Launch {
     pub(crate) fn start(self, spec: &SpawnSpec) -> Result<LaunchedAgent, SpawnError> {
         let Self {
             mut command,
-            setup,
+            mut setup,
             answerer,
             channel,
             status,
@@ -168,14 +172,20 @@ impl Launch {
         let Channel {
             lines,
             log,
-            agent_fds: [stdin, stdout, stderr],
+            agent_fds: [questions, answers, stderr],
             output_name,
         } = channel;
-        command
-            .stdin(stdin)
-            .stdout(stdout)
-            .stderr(stderr)
-            .process_group(0);
+        command.process_group(0);
+        if spec.logs_output {
+            setup.protocol = Some(ProtocolDescriptors { questions, answers });
+            let stdout = stderr
+                .try_clone()
+                .context("cannot pass the agent its log")?;
+            command.stdin(Stdio::null()).stdout(stdout);
+        } else {
+            command.stdin(questions).stdout(answers);
+        }
+        command.stderr(stderr);
         let is_sandboxed = status.is_some();
         let report = setup.install(&mut command).context("cannot make a pipe")?;
         let child = match spawner::spawn(command) {

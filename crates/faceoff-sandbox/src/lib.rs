@@ -48,6 +48,7 @@ mod probe;
 mod process;
 mod process_tree;
 mod program_file;
+mod protocol_descriptors;
 mod runtime;
 mod sched_stat;
 mod seccomp;

@@ -212,6 +212,7 @@ fn run(layers: &[Layer], program: &str, arguments: &[&str]) -> Result<String, St
             .chain(arguments.iter().map(|&argument| argument.to_owned()))
             .collect(),
         env: BTreeMap::new(),
+        logs_output: false,
         runtime,
         limits: Limits {
             open_files: PROBE_OPEN_FILES,

@@ -15,6 +15,9 @@ pub struct SpawnSpec {
     pub command: Vec<String>,
     /// Environment variables of the bundle; they may replace `HOME`, `PATH` and the like.
     pub env: BTreeMap<String, String>,
+    /// Is the agent's standard output part of its log? Then the protocol uses the file descriptors 3 (questions) and 4 (answers), and
+    /// standard input is empty.
+    pub logs_output: bool,
     /// The visible files of the host; for a container image its root, whose folder `agent` is the bundle.
     pub runtime: Runtime,
     /// Resources that the process tree may use.

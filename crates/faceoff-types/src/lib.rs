@@ -24,6 +24,7 @@ mod ids;
 mod invalid_stage_rules;
 mod limits;
 mod live_game;
+mod look_alikes;
 mod magnitudes;
 mod millionths;
 mod names;

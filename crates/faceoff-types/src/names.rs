@@ -1,10 +1,9 @@
 //! Names that people choose for teams, stages, divisions and users, in any script and with the same rules for all.
 
-use crate::is_printable;
+use crate::{is_printable, look_alikes::skeleton};
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
 use unicode_normalization::{UnicodeNormalization, char::is_combining_mark};
-use unicode_security::confusable_detection::skeleton;
 
 /// Longest name, in characters without accents and other marks.
 const MAX_CHARS: usize = 40;
@@ -101,8 +100,7 @@ pub fn name_skeleton(name: &str) -> String {
     let plain: String = name.trim().nfkc().filter(|c| !is_joiner(*c)).collect();
     // Upper and lower case of a letter may resemble different letters.
     let lower = plain.to_lowercase();
-    let skeleton: String = skeleton(&lower).collect();
-    skeleton.to_lowercase()
+    skeleton(&lower).to_lowercase()
 }
 
 macro_rules! name {

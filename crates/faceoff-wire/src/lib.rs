@@ -27,7 +27,7 @@ mod protocol;
 mod quote;
 pub mod remote;
 
-pub use manifest::{MANIFEST_MAX_BYTES, Manifest, ManifestError};
+pub use manifest::{MANIFEST_MAX_BYTES, Manifest, ManifestError, StandardOutput};
 pub use message::Message;
 pub use protocol::{MAX_LINE_BYTES, PROTOCOL_VERSION};
 pub use quote::quote_line;

@@ -23,9 +23,30 @@ pub struct Manifest {
     /// trajectories omits the key and has `null` in `ready`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interpolation: Option<i64>,
+    /// What the agent's standard output is.
+    #[serde(default, skip_serializing_if = "StandardOutput::is_answers")]
+    pub stdout: StandardOutput,
     /// Environment variables for the agent, at most 64.
     #[serde(default)]
     pub env: BTreeMap<String, String>,
+}
+
+/// What an agent's standard output is.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum StandardOutput {
+    /// The answers of the protocol; questions come from standard input.
+    #[default]
+    Answers,
+    /// Part of the log, like standard error, for programs that cannot be kept quiet. The protocol uses the file descriptors 3 (questions)
+    /// and 4 (answers).
+    Log,
+}
+
+impl StandardOutput {
+    const fn is_answers(&self) -> bool {
+        matches!(self, Self::Answers)
+    }
 }
 
 /// The reason for refusing an `agent.toml`; shown to the team.
@@ -207,6 +228,18 @@ mod tests {
     }
 
     #[test]
+    fn standard_output_may_be_the_log() {
+        let manifest = Manifest::parse(VALID_MANIFEST).unwrap();
+        assert_eq!(manifest.stdout, StandardOutput::Answers);
+        assert!(!toml::to_string(&manifest).unwrap().contains("stdout"));
+        let text = VALID_MANIFEST.replace("[env]", "stdout = \"log\"\n[env]");
+        let manifest = Manifest::parse(&text).unwrap();
+        assert_eq!(manifest.stdout, StandardOutput::Log);
+        let written = toml::to_string(&manifest).unwrap();
+        assert_eq!(Manifest::parse(&written).unwrap(), manifest);
+    }
+
+    #[test]
     fn manifest_error_names_the_key() {
         for (from, to, expected_words) in [
             ("name = \"striker\"", "", "missing field `name`"),
@@ -238,6 +271,11 @@ mod tests {
                 "unknown field `interpretation`",
             ),
             ("OMP_NUM_THREADS", "\"A=B\"", "env.A=B must be a name"),
+            (
+                "interpolation = 3",
+                "stdout = \"null\"",
+                "unknown variant `null`, expected `answers` or `log`",
+            ),
         ] {
             assert!(VALID_MANIFEST.contains(from), "{from}");
             let message = Manifest::parse(&VALID_MANIFEST.replace(from, to))

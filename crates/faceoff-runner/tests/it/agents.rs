@@ -3,7 +3,7 @@
 use faceoff_runner::{AgentEnvironment, Supervision, TimeLimits, bundle::Bundle};
 use faceoff_sandbox::{Isolation, Limits, Runtime, RuntimeFiles};
 use faceoff_types::{AgentFaultKind, Phase};
-use faceoff_wire::Manifest;
+use faceoff_wire::{Manifest, StandardOutput};
 use std::{collections::BTreeMap, fs, os::unix::fs::PermissionsExt};
 use tempfile::TempDir;
 
@@ -73,6 +73,7 @@ impl Agent {
             command: vec!["python3".into(), "agent.py".into()],
             runtime: "python3".into(),
             interpolation: None,
+            stdout: StandardOutput::Answers,
             env: BTreeMap::new(),
         };
         let bundle = Bundle {

@@ -84,6 +84,7 @@ impl Subject {
             bundle_dir: bundle.path().to_path_buf(),
             command,
             env: BTreeMap::new(),
+            logs_output: false,
             runtime: Runtime::python3().expect("the tests need a python3"),
             limits: Limits {
                 memory_bytes: 256 << 20,

@@ -56,6 +56,28 @@ fn output_before_a_question_is_detected() {
     subject.finish(agent);
 }
 
+/// The agent prints to all of its files; the answers come from file descriptor 4 only.
+#[test]
+fn standard_output_may_be_the_log() {
+    use faceoff_sandbox::Isolation;
+    let script = "echo printed; echo logged >&2; read -r empty && echo 'standard input has a line'; \
+                  while read -r line <&3; do echo \"$line\" >&4; done; echo end";
+    for isolation in [None, Some(Isolation::None)] {
+        let mut subject = Subject::new("echo", &[]);
+        subject.spec.command = ["sh", "-c", script, &subject.mark]
+            .map(str::to_owned)
+            .to_vec();
+        subject.spec.logs_output = true;
+        subject.spec.isolation = isolation.unwrap_or(subject.spec.isolation);
+        let mut agent = subject.spawn();
+        expect_echo(&mut agent, "question");
+        let usage = agent.finish(TIMEOUT).unwrap();
+        assert_eq!(usage.stderr, "printed\nlogged\nend\n");
+        assert_eq!(usage.exit, None);
+        subject.assert_nothing_left();
+    }
+}
+
 #[test]
 fn silent_agent_times_out_and_can_answer_later() {
     let subject = Subject::new("echo", &[]);

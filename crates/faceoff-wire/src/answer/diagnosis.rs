@@ -59,7 +59,9 @@ pub(super) fn diagnose(
 fn hint(text: &str) -> Option<&'static str> {
     let text = text.trim_start();
     if !text.starts_with('{') {
-        return Some("standard output is for answers; print everything else to standard error");
+        return Some(
+            "standard output is for answers; print everything else to standard error, or make it the log: stdout = \"log\" in agent.toml",
+        );
     }
     let first_key = text[1..].trim_start();
     let has_word = |words: &[&str]| words.iter().any(|word| text.contains(word));

@@ -172,6 +172,7 @@ impl Evaluator for Scripted {
             command: vec!["./agent".into()],
             runtime: "native".into(),
             interpolation: None,
+            stdout: faceoff_wire::StandardOutput::Answers,
             env: BTreeMap::new(),
         };
         Ok(Bundle {

@@ -11,7 +11,7 @@ const VALID: [&str; 2] = [
 ];
 
 /// Texts that mutations insert.
-const WORDS: [&str; 24] = [
+const WORDS: [&str; 25] = [
     "\"\"",
     "''",
     "[]",
@@ -34,6 +34,7 @@ const WORDS: [&str; 24] = [
     "\"A=B\" = \"c\"\n",
     "1 = \"c\"\n",
     "interpolation",
+    "stdout = \"log\"\n",
     "command = [\"\"]\n",
     "\u{1b}[2J",
 ];
@@ -100,6 +101,7 @@ fn toml_of(manifest: &Manifest) -> String {
         command,
         runtime,
         interpolation,
+        stdout,
         env,
     } = manifest;
     let mut lines = vec![
@@ -108,6 +110,7 @@ fn toml_of(manifest: &Manifest) -> String {
         format!("runtime = {}", json(runtime)),
     ];
     lines.extend(interpolation.map(|code| format!("interpolation = {code}")));
+    lines.push(format!("stdout = {}", json(stdout)));
     lines.push("[env]".to_owned());
     lines.extend(
         env.iter()
