@@ -37,7 +37,7 @@ export CARGO_INCREMENTAL := 0
 endif
 DEMO       := $(TARGET_DIR)/demo
 
-.PHONY: channels demo test tests-built tests-of-rust tests-of-python tests-of-api tests-of-agents tests-of-scripts test-release costs web wheel pictures test-api test-python test-learning fuzz busy load route-costs remote-slot crowd objects soak steady frames test-cgroup2 test-box test-engine test-first-hour lint format fidelity setup setup-test agents dist clean-demo help
+.PHONY: channels demo test tests-built tests-of-rust tests-of-python tests-of-api tests-of-agents tests-of-scripts test-release costs web wheel pictures test-api test-python test-learning fuzz busy load route-costs remote-slot crowd objects soak steady frames test-cgroup2 test-box test-engine test-first-hour test-languages lint format fidelity setup setup-test agents dist clean-demo help
 
 help:
 	@echo "make demo   run a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
@@ -54,6 +54,7 @@ help:
 	@echo "make test-cgroup2   test the sandbox's limits on cgroup v2, in a virtual machine without v1"
 	@echo "make test-box   build the images' file systems without a container engine, and start the programs in them"
 	@echo "make test-first-hour   run the first hour of the guide in a fresh Debian: SUITE=$(SUITE)"
+	@echo "make test-languages   play agents in C++, C#, Java, JavaScript, Lua, Python and Rust, as bundles and as images"
 	@echo "make test-engine   build the images with Docker, and run a day in containers; WHOLE=1 also compiles there"
 	@echo "make fuzz   fuzz the parsers with almost valid input: MINUTES=$(MINUTES)"
 	@echo "make channels   print the rates of the channels between agents that remain"
@@ -94,6 +95,12 @@ test-first-hour: setup
 	$(CARGO) build --locked --workspace --bins --tests
 	python3 tests/first_hour/first_hour.py --program "$(TARGET_DIR)/debug/faceoff" --cache "$(TARGET_DIR)/first-hour" --suite $(SUITE)
 	python3 tests/first_hour/hosts.py --program "$(TARGET_DIR)/debug/faceoff" --cache "$(TARGET_DIR)/first-hour" --suite $(SUITE)
+
+# Agents in all languages, as bundles and as container images. As root: the images' Debian is made from its packages. Not below /tmp.
+test-languages: setup
+	@docker/setup.sh languages
+	$(CARGO) build --locked --workspace --bins --tests
+	python3 tests/languages/test_languages.py --program "$(TARGET_DIR)/debug/faceoff" --work "$(TARGET_DIR)/languages" --images
 
 # Builds, checks and packs the release program, after a test of the check (docker/check-program.sh).
 test-release:

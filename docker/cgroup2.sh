@@ -96,7 +96,8 @@ END
 chmod 755 "$initramfs/init"
 
 {
-    printf "program='%s'\ntests='%s'\nrunner_tests='%s'\nrepository='%s'\n" "$program" "$tests" "$runner_tests" "$(dirname "$folder")"
+    printf "program='%s'\ntests='%s'\nrunner_tests='%s'\nrepository='%s'\nlanguages='%s'\n" "$program" "$tests" "$runner_tests" "$(dirname "$folder")" \
+        "$(realpath -m "$TARGET_DIR/languages")"
     cat <<'END'
 set -u
 export PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/run/scratch TMPDIR=/run/scratch
@@ -112,7 +113,7 @@ expect() { # expect NAME COMMAND…
 # The sandbox's tests that use a cgroup: limits, exits, CPUs, and cleanup after a killed service.
 limits() {
     "$tests" --test-threads 1 resource_limits:: process_limits:: cpu_limits:: cpu_count:: process_cleanup:: \
-        killed_service:: exit_causes:: probe:: normal_operation:: channel_blocking::
+        killed_service:: exit_causes:: probe:: normal_operation:: channel_blocking:: system_use::
 }
 # The tests of the evaluator, which asks agents and measures their time, with agents that block it or compute before they are asked.
 attacks() {
@@ -121,6 +122,14 @@ attacks() {
 # Counters of the host and shared files as channels between agents.
 channels() {
     "$tests" --test-threads 1 host_counters:: covert_channels::
+}
+# Agents in all languages, if `make test-languages` has prepared them.
+languages() {
+    if [ -e "$languages/faceoff.toml" ]; then
+        /usr/bin/python3 "$repository/tests/languages/test_languages.py" --program "$program" --work "$languages" --prepared
+    else
+        echo "not tested: make test-languages prepares the agents"
+    fi
 }
 # All checks of doctor, three of them with cgroup v2. The exit status alone does not show the version.
 doctor() {
@@ -166,6 +175,10 @@ expect leaf-tests sh -c "echo 0 >$top/leaf-tests/cgroup.procs; exec sh '$0' run 
 case_is "leaf: agents that attack the evaluator's clock, as root in a busy cgroup"
 mkdir $top/leaf-attacks
 expect leaf-attacks sh -c "echo 0 >$top/leaf-attacks/cgroup.procs; exec sh '$0' run attacks"
+
+case_is "leaf: agents in all languages, as root in a busy cgroup"
+mkdir $top/leaf-languages
+expect leaf-languages sh -c "echo 0 >$top/leaf-languages/cgroup.procs; exec sh '$0' run languages"
 
 case_is "leaf: channels between agents, as root in a busy cgroup"
 mkdir $top/leaf-channels

@@ -9,6 +9,7 @@
 #   docker/setup.sh cgroup2  also a virtual machine for the tests of cgroup v2
 #   docker/setup.sh box      also tools to build images without a container engine
 #   docker/setup.sh first-hour   also tools to make a Debian and its network
+#   docker/setup.sh languages    also the languages of agents
 #   docker/setup.sh engine   also Docker, tools for its base images, and other tools that save images
 #
 # As root it installs them with apt-get; otherwise it prints the command and fails.
@@ -70,6 +71,18 @@ fi
 if [ "$purpose" = first-hour ]; then
     need debootstrap debootstrap
     need ip iproute2
+fi
+if [ "$purpose" = languages ]; then
+    need g++ g++
+    need javac openjdk-17-jdk-headless
+    need node nodejs
+    need lua5.4 lua5.4
+    [ -e /usr/share/lua/5.4/cjson ] || missing="$missing lua-cjson"
+    need mono mono-runtime
+    need mcs mono-mcs
+    [ -e /usr/lib/mono/4.5/System.Core.dll ] || missing="$missing libmono-system-core4.0-cil"
+    need mmdebstrap mmdebstrap
+    python3 -c 'import ensurepip' 2>/dev/null || missing="$missing python3-venv"
 fi
 if [ "$purpose" = engine ]; then
     need dockerd docker.io

@@ -25,7 +25,7 @@ EPISODES = 20
 # Commands that compile an agent in its folder.
 COMPILERS = {
     "cpp": ["g++", "-std=c++20", "-O2", "-static-libstdc++", "-static-libgcc", "-o", "agent", "agent.cpp"],
-    "java": ["javac", "Agent.java"],
+    "java": ["javac", "--release", "17", "Agent.java"],
     "csharp": ["mcs", "-out:agent.exe", "Agent.cs"],
 }
 # Lines that agents print to their logs.
@@ -100,7 +100,8 @@ def save_image(base, agent, path):
         "rootfs": {"type": "layers", "diff_ids": [f"sha256:{layer}" for layer in layers]},
     }
     manifest = [{"Config": "config.json", "RepoTags": ["agent:latest"], "Layers": ["base.tar", "agent.tar"]}]
-    with tarfile.open(path, "w") as image:
+    # Unpacked it has more than an upload may have.
+    with tarfile.open(path, "w:gz", compresslevel=1) as image:
         image.add(base, "base.tar")
         texts = (("config.json", json.dumps(config).encode()), ("manifest.json", json.dumps(manifest).encode()))
         for name, content in (("agent.tar", own.getvalue()), *texts):
@@ -117,7 +118,7 @@ def image_of(work, language):
     description = (agent / "agent.toml").read_text()
     lines = ['runtime = "image"' if line.startswith("runtime") else line for line in description.splitlines()]
     (agent / "agent.toml").write_text("\n".join(lines) + "\n")
-    path = work / "images" / f"{language}.tar"
+    path = work / "images" / f"{language}.tar.gz"
     save_image(base_image(work), agent, path)
     return path
 
