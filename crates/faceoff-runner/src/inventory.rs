@@ -75,6 +75,7 @@ struct Answer {
     version: String,
     libc: Option<String>,
     packages: BTreeMap<String, String>,
+    unusable_packages: BTreeMap<String, String>,
 }
 
 impl From<Answer> for PythonInventory {
@@ -84,6 +85,7 @@ impl From<Answer> for PythonInventory {
             version: answer.version,
             libc: answer.libc,
             packages: answer.packages,
+            unusable_packages: answer.unusable_packages,
         }
     }
 }

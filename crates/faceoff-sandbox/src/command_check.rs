@@ -1,6 +1,6 @@
 //! Checks the bundle's command before the start, so that common mistakes get a clear message.
 
-use crate::program_file::ProgramFile;
+use crate::{Runtime, program_file::ProgramFile};
 use faceoff_types::AgentFaultKind;
 use rustix::{
     fs::{FileType, Mode, OFlags, ResolveFlags, Stat, fstat, open, openat2},
@@ -16,11 +16,12 @@ const MAX_TOTAL_BYTES: usize = 256 << 10;
 /// Refuses an empty command, arguments or variables that no program can be given, and a program of the bundle
 /// that is missing, not executable or of another system. A program of the runtime is looked up inside the sandbox only.
 ///
-/// Returns what the start of a program of the bundle needs, for the error if it fails.
+/// Returns what the start of the program needs, for the error if it fails.
 pub(crate) fn check_command(
     bundle_dir: &Path,
     command: &[String],
     env: &BTreeMap<String, String>,
+    runtime: &Runtime,
 ) -> Result<Option<String>, AgentFaultKind> {
     let refuse = |detail: String| Err(AgentFaultKind::CannotStart { detail });
     let Some(program) = command.first().filter(|program| !program.is_empty()) else {
@@ -48,7 +49,11 @@ pub(crate) fn check_command(
     }
     let path_in_bundle = match program.strip_prefix("/agent/") {
         Some(rest) => rest.trim_start_matches('/'),
-        None if program.starts_with('/') || !program.contains('/') => return Ok(None),
+        None if program.starts_with('/') => return Ok(None),
+        None if !program.contains('/') => {
+            let search_path = env.get("PATH").unwrap_or(&runtime.path);
+            return Ok(runtime.missing_program(program, search_path));
+        }
         None => program.as_str(),
     };
     if climbs_out(path_in_bundle) {
@@ -119,7 +124,12 @@ mod tests {
     };
 
     fn check(bundle_dir: &Path, program: &str) -> Option<String> {
-        match check_command(bundle_dir, &[program.to_owned()], &BTreeMap::new()) {
+        match check_command(
+            bundle_dir,
+            &[program.to_owned()],
+            &BTreeMap::new(),
+            &Runtime::native(),
+        ) {
             Ok(_) => None,
             Err(AgentFaultKind::CannotStart { detail }) => Some(detail),
             Err(other) => panic!("{other:?}"),

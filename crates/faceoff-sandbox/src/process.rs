@@ -76,8 +76,8 @@ impl AgentProcess {
             "cannot find the bundle {}",
             spec.bundle_dir.display()
         ))?;
-        let start_needs =
-            check_command(&bundle_dir, &spec.command, &spec.env).map_err(SpawnError::Agent)?;
+        let start_needs = check_command(&bundle_dir, &spec.command, &spec.env, &spec.runtime)
+            .map_err(SpawnError::Agent)?;
         let spec = SpawnSpec {
             bundle_dir,
             ..spec.clone()

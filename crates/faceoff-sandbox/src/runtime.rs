@@ -11,7 +11,7 @@ use std::{
 /// Folders of shared libraries and of the dynamic loader, as distributions lay them out, and what programs find on every host: the links
 /// of Debian's alternatives, through which libraries and programs are reached, and the time zones. On hosts with
 /// a merged /usr the short paths are links, and the sandbox has the same links.
-const LIBRARY_PATHS: [&str; 11] = [
+pub(crate) const LIBRARY_PATHS: [&str; 11] = [
     "/etc/alternatives",
     "/usr/share/zoneinfo",
     "/usr/lib",

@@ -54,6 +54,9 @@ pub struct PythonInventory {
     pub libc: Option<String>,
     /// Versions of the importable packages outside the standard library, by lower-case name.
     pub packages: BTreeMap<String, String>,
+    /// Installed packages that cannot be imported, by lower-case name, with the error. Only packages that agents often use are tried.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub unusable_packages: BTreeMap<String, String>,
 }
 
 impl PythonInventory {
@@ -89,6 +92,7 @@ mod tests {
             version: "3.11.2".into(),
             libc: Some("2.36".into()),
             packages: BTreeMap::from([("numpy".into(), "2.4.6".into())]),
+            unusable_packages: BTreeMap::new(),
         };
         assert_eq!(python.minor_version(), "3.11");
         let inventory = RuntimeInventory {

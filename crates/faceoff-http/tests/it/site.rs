@@ -186,6 +186,7 @@ fn agent_resources() -> AgentResources {
         packages: [("numpy", "2.4.6"), ("<b>odd</b>", "1")]
             .map(|(name, version)| (name.into(), version.into()))
             .into(),
+        unusable_packages: BTreeMap::new(),
     };
     let inventory = |name: &str, content| RuntimeInventory {
         name: name.into(),

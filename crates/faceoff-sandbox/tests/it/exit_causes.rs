@@ -134,9 +134,12 @@ fn command_that_cannot_be_executed_is_an_agent_fault() {
         start_error(&["./echo.py"]),
         "`./echo.py` is not executable (mode 644)"
     );
-    assert_eq!(
-        start_error(&["no-such-program"]),
-        "no-such-program: No such file or directory"
+    let missing = start_error(&["no-such-program"]);
+    assert!(
+        missing.starts_with(
+            "no-such-program: No such file or directory; it is in none of the folders of PATH, /"
+        ),
+        "{missing}"
     );
     assert_eq!(
         start_error(&["/usr/sbin/no-such"]),

@@ -104,6 +104,7 @@ mod tests {
             packages: packages
                 .map(|(name, version)| ((*name).into(), (*version).into()))
                 .collect(),
+            unusable_packages: std::collections::BTreeMap::new(),
         })
     }
 

@@ -7,23 +7,19 @@ mod check;
 mod clock;
 mod permissions;
 mod report;
+mod runtimes;
 mod worker_admission;
 
 use super::config_file::ConfigFile;
-use crate::{
-    config::{Config, RuntimeConfig},
-    descriptors::Descriptors,
-};
+use crate::{config::Config, descriptors::Descriptors};
 use anyhow::{Context as _, bail};
 use check::Check;
 use clap::Args;
-use faceoff_runner::take_inventory;
 use faceoff_sandbox::{
-    HostFeature, Isolation, Layer, MEMORY_FOLDER, MemoryImage, MemoryImageError, Runtime,
-    probe_host,
+    HostFeature, Layer, MEMORY_FOLDER, MemoryImage, MemoryImageError, probe_host,
 };
 use faceoff_store::FreeSpace;
-use faceoff_types::{RuntimeContent, RuntimeInventory};
+use runtimes::{RuntimeReport, runtime_reports};
 use serde::Serialize;
 use std::{io::Write as _, path::PathBuf};
 
@@ -42,9 +38,6 @@ pub struct DoctorCommand {
     #[arg(long)]
     json: bool,
 }
-
-/// Packages whose versions are shown.
-const SHOWN_PACKAGES: [&str; 4] = ["numpy", "scipy", "onnxruntime", "torch"];
 
 #[derive(Debug, Serialize)]
 struct Findings {
@@ -97,14 +90,6 @@ struct LayerReport {
     feature: HostFeature,
     /// Named in `[sandbox] given_up`.
     given_up: bool,
-}
-
-#[derive(Debug, Serialize)]
-struct RuntimeReport {
-    name: String,
-    available: bool,
-    found: String,
-    cure: Option<String>,
 }
 
 #[derive(Debug, Serialize)]
@@ -184,33 +169,6 @@ fn missing_layers(features: &[LayerReport]) -> impl Iterator<Item = Layer> {
         .map(|layer| layer.feature.layer)
 }
 
-/// Inspects each runtime inside the sandbox, with the layers that this host has.
-fn runtime_reports(config: &Config, features: &[LayerReport]) -> Vec<RuntimeReport> {
-    let mut env = config.agent_environment();
-    let unavailable = features.iter().filter(|layer| !layer.feature.available);
-    env.isolation = Isolation::Sandboxed {
-        disabled_layers: unavailable.map(|layer| layer.feature.layer).collect(),
-    };
-    let mut found: Vec<_> = take_inventory(&env)
-        .into_iter()
-        .map(|RuntimeInventory { name, content }| RuntimeReport {
-            available: !matches!(content, RuntimeContent::Failed { .. }),
-            found: describe(&content, env.runtimes.get(&name)),
-            cure: cure(config, &name, &content),
-            name,
-        })
-        .collect();
-    if !env.runtimes.contains_key("python3") {
-        found.push(RuntimeReport {
-            name: "python3".into(),
-            available: false,
-            found: "python3 was not found in the usual places".into(),
-            cure: Some("apt-get install python3".into()),
-        });
-    }
-    found
-}
-
 fn memory_report(config: &Config) -> MemoryReport {
     let runtimes = config.agent_environment().runtimes;
     match MemoryImage::size(&runtimes, config.sandbox.resident_bytes) {
@@ -241,54 +199,6 @@ fn memory_report(config: &Config) -> MemoryReport {
             }),
         },
     }
-}
-
-fn describe(content: &RuntimeContent, runtime: Option<&Runtime>) -> String {
-    match content {
-        RuntimeContent::Python(python) => {
-            let interpreter = runtime.and_then(Runtime::interpreter);
-            let location = interpreter.map(|path| format!(" at {}", path.display()));
-            let is_installed = |name: &&str| python.packages.contains_key(*name);
-            let shown: Vec<_> = SHOWN_PACKAGES
-                .iter()
-                .filter(|name| is_installed(name))
-                .map(|name| format!("{name} {}", python.packages[*name]))
-                .collect();
-            let other_count = python.packages.len() - shown.len();
-            format!(
-                "{} {}{}; {}{other_count} other packages",
-                python.implementation,
-                python.version,
-                location.unwrap_or_default(),
-                shown
-                    .iter()
-                    .map(|package| format!("{package}, "))
-                    .collect::<String>(),
-            )
-        }
-        RuntimeContent::Native { libc } => format!(
-            "{} host paths, read-only; C library {}",
-            runtime.map_or(0, |runtime| runtime.read_only_paths.len()),
-            libc.as_deref().unwrap_or("of unknown version")
-        ),
-        RuntimeContent::Image => "container images, which contain their own files".to_owned(),
-        RuntimeContent::Failed { reason } => reason.clone(),
-    }
-}
-
-fn cure(config: &Config, name: &str, content: &RuntimeContent) -> Option<String> {
-    let RuntimeContent::Failed { .. } = content else {
-        return None;
-    };
-    Some(match config.runtimes.get(name) {
-        Some(RuntimeConfig::Folder(folder)) => {
-            format!("rebuild it: docker/runtime.sh {}", folder.display())
-        }
-        Some(RuntimeConfig::Paths { .. }) => {
-            format!("correct read_only_paths of [runtimes.{name}] in the configuration")
-        }
-        None => "see the missing sandbox layers above".to_owned(),
-    })
 }
 
 fn cpu_report(config: &Config) -> CpuReport {

@@ -72,8 +72,12 @@ fn runtime_line(runtime: &RuntimeInventory) -> String {
             let packages: Vec<_> = packages
                 .map(|(name, version)| format!("{name} {version}"))
                 .collect();
+            let unusable = python.unusable_packages.iter();
+            let unusable: String = unusable
+                .map(|(name, reason)| format!("; {name} cannot be imported: {reason}"))
+                .collect();
             format!(
-                "{} {}, {}; {}",
+                "{} {}, {}; {}{unusable}",
                 python.implementation,
                 python.version,
                 libc(&python.libc),

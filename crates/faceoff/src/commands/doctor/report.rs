@@ -37,6 +37,9 @@ impl Findings {
             let status = if runtime.available { "ok" } else { "none" };
             writeln!(out, "  {status:<9} {:<14} {}", runtime.name, runtime.found)?;
             print_cure(out, runtime.cure.as_deref())?;
+            for link in &runtime.hidden_targets {
+                writeln!(out, "  {:<9}    links out: {link}", "")?;
+            }
         }
         let memory = &self.in_memory;
         let status = if memory.available { "ok" } else { "none" };

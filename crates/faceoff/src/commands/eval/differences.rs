@@ -152,6 +152,7 @@ mod tests {
                 version: version.into(),
                 libc: Some("2.36".into()),
                 packages: packages.collect(),
+                unusable_packages: std::collections::BTreeMap::new(),
             }),
         }
     }

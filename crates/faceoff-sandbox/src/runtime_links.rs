@@ -1,0 +1,193 @@
+//! Links of a runtime that lead to files which agents do not see.
+//!
+//! Distributions keep parts of a program elsewhere and link to them, as from `/usr/lib/jvm` to `/etc`. Inside the sandbox such a link leads
+//! nowhere, and the program fails with an error that names neither.
+
+use crate::{
+    Runtime,
+    runtime::{LIBRARY_PATHS, path_in_image},
+};
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+};
+
+/// Entries of folders that are looked at.
+const MAX_ENTRIES: usize = 500_000;
+/// Links that are followed to a program.
+const MAX_LINKS: usize = 40;
+/// Targets are put together by this many components, as in `/etc/java-17-openjdk`.
+const GROUP_COMPONENTS: usize = 3;
+
+/// Links into one folder that agents do not see.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct HiddenTarget {
+    /// The folder or file on the host.
+    pub path: PathBuf,
+    /// One of the links.
+    pub link: PathBuf,
+    /// Number of links.
+    pub links: usize,
+}
+
+impl Runtime {
+    /// Where links of this runtime lead out of it, the folder with most links first. Links to files that the host lacks, too, are left out,
+    /// and those in the system's folders of libraries, but not those of programs of the runtime that are installed there.
+    #[must_use]
+    pub fn hidden_targets(&self) -> Vec<HiddenTarget> {
+        let mut found: BTreeMap<PathBuf, HiddenTarget> = BTreeMap::new();
+        let is_system = |path: &Path| LIBRARY_PATHS.iter().any(|system| path == Path::new(system));
+        let mut folders = self.read_only_paths.clone();
+        folders.retain(|path| !is_system(path));
+        let programs: Vec<_> = folders
+            .iter()
+            .filter_map(|path| home_of_program(path))
+            .collect();
+        folders.extend(programs);
+        let mut seen = 0;
+        while let Some(path) = folders.pop() {
+            let Ok(kind) = fs::symlink_metadata(&path).map(|found| found.file_type()) else {
+                continue;
+            };
+            if kind.is_symlink() {
+                if let Some(target) = self.hidden_target(&path) {
+                    let group: PathBuf = target.components().take(GROUP_COMPONENTS).collect();
+                    let hidden = found.entry(group.clone()).or_insert(HiddenTarget {
+                        path: group,
+                        link: path,
+                        links: 0,
+                    });
+                    hidden.links += 1;
+                }
+            } else if kind.is_dir() && seen < MAX_ENTRIES {
+                let children = fs::read_dir(&path).into_iter().flatten().flatten();
+                let before = folders.len();
+                folders.extend(children.map(|child| child.path()));
+                seen += folders.len() - before;
+            }
+        }
+        let mut found: Vec<_> = found.into_values().collect();
+        found.sort_by(|one, other| (other.links, &one.path).cmp(&(one.links, &other.path)));
+        found
+    }
+
+    /// Why a program of this runtime cannot start: `search_path` has no folder with it, or it is a link that leads out of the runtime.
+    pub(crate) fn missing_program(&self, program: &str, search_path: &str) -> Option<String> {
+        for folder in search_path.split(':') {
+            let mut path = Path::new(folder).join(program);
+            if let Some(root) = self.root() {
+                if fs::symlink_metadata(path_in_image(root, &path)).is_ok() {
+                    return None;
+                }
+                continue;
+            }
+            for _ in 0..MAX_LINKS {
+                if !self.shows(&path) || fs::symlink_metadata(&path).is_err() {
+                    break;
+                }
+                if let Some(target) = self.hidden_target(&path) {
+                    return Some(format!(
+                        "{} is a link to {}, which agents do not see; the organisers add that to `read_only_paths` of the runtime",
+                        path.display(),
+                        target.display()
+                    ));
+                }
+                let Ok(target) = fs::read_link(&path) else {
+                    return None;
+                };
+                path = path.parent().unwrap_or(Path::new("/")).join(target);
+            }
+        }
+        Some(format!(
+            "it is in none of the folders of PATH, {search_path}"
+        ))
+    }
+
+    fn shows(&self, path: &Path) -> bool {
+        self.read_only_paths
+            .iter()
+            .any(|shown| path.starts_with(shown))
+    }
+
+    /// The target of a link, if it exists and agents do not see it.
+    fn hidden_target(&self, link: &Path) -> Option<PathBuf> {
+        let target = link.parent()?.join(fs::read_link(link).ok()?);
+        let folder = fs::canonicalize(target.parent()?).ok()?;
+        let target = folder.join(target.file_name()?);
+        let is_visible = self.shows(&target)
+            || self
+                .read_only_paths
+                .iter()
+                .any(|path| fs::canonicalize(path).is_ok_and(|path| target.starts_with(path)));
+        (!is_visible && target.exists()).then_some(target)
+    }
+}
+
+/// The folder of a program that is installed in one of its own, as `/usr/lib/jvm/java` of `/usr/lib/jvm/java/bin/java`, by which links it
+/// may be reached.
+fn home_of_program(path: &Path) -> Option<PathBuf> {
+    let program = fs::canonicalize(path).ok().filter(|path| path.is_file())?;
+    let folder = program.parent()?;
+    let home = folder.parent().filter(|_| folder.ends_with("bin"))?;
+    let is_shared = ["/", "/usr", "/usr/local"]
+        .iter()
+        .any(|shared| home == Path::new(shared));
+    (!is_shared).then(|| home.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::RuntimeFiles;
+    use std::os::unix::fs::symlink;
+
+    #[test]
+    fn links_out_of_a_runtime_are_found() {
+        let host = tempfile::tempdir().unwrap();
+        let path = |name: &str| host.path().join(name);
+        fs::create_dir_all(path("lib/program")).unwrap();
+        fs::create_dir_all(path("settings")).unwrap();
+        for file in ["settings/one", "settings/two", "lib/inside"] {
+            fs::write(path(file), "").unwrap();
+        }
+        symlink(path("settings/one"), path("lib/program/one")).unwrap();
+        symlink("../../settings/two", path("lib/program/two")).unwrap();
+        symlink("../inside", path("lib/program/inside")).unwrap();
+        symlink("../../nowhere", path("lib/program/broken")).unwrap();
+        let runtime = |paths: &[&str]| Runtime {
+            read_only_paths: paths.iter().map(|name| path(name)).collect(),
+            path: String::new(),
+            files: RuntimeFiles::Host,
+        };
+        let hidden = runtime(&["lib"]).hidden_targets();
+        let links: usize = hidden.iter().map(|target| target.links).sum();
+        assert_eq!(links, 2, "{hidden:?}");
+        assert!(path("settings/one").starts_with(&hidden[0].path));
+        assert_eq!(runtime(&["lib", "settings"]).hidden_targets(), []);
+        // A program that is reached by a link, as Java in /usr/bin.
+        fs::create_dir(path("lib/program/bin")).unwrap();
+        fs::write(path("lib/program/bin/run"), "").unwrap();
+        symlink("lib/program/bin/run", path("run")).unwrap();
+        let by_program = runtime(&["run", "lib/program/bin"]).hidden_targets();
+        let links: usize = by_program.iter().map(|target| target.links).sum();
+        // Two links into the settings, one to `inside`.
+        assert_eq!(links, 3, "{by_program:?}");
+        symlink(path("settings/one"), path("lib/elsewhere")).unwrap();
+        let folder = path("lib").display().to_string();
+        let reason = runtime(&["lib"])
+            .missing_program("elsewhere", &folder)
+            .unwrap();
+        assert!(
+            reason.contains("settings/one, which agents do not see"),
+            "{reason}"
+        );
+        let reason = runtime(&["lib"])
+            .missing_program("nothing", &folder)
+            .unwrap();
+        assert_eq!(
+            reason,
+            format!("it is in none of the folders of PATH, {folder}")
+        );
+    }
+}
