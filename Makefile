@@ -14,6 +14,8 @@ WORKERS  ?= 200
 SLEEP_S  ?= 10
 # test-engine: 1 also compiles the program in an image.
 WHOLE    ?=
+# test-languages: 0 leaves out the images.
+IMAGES   ?=
 # test-first-hour: version of Debian.
 SUITE    ?= bookworm
 # costs: see its target.
@@ -100,7 +102,7 @@ test-first-hour: setup
 test-languages: setup
 	@docker/setup.sh languages
 	$(CARGO) build --locked --workspace --bins --tests
-	python3 tests/languages/test_languages.py --program "$(TARGET_DIR)/debug/faceoff" --work "$(TARGET_DIR)/languages" --images
+	python3 tests/languages/test_languages.py --program "$(TARGET_DIR)/debug/faceoff" --work "$(TARGET_DIR)/languages" $(if $(filter 0,$(IMAGES)),,--images)
 
 # Builds, checks and packs the release program, after a test of the check (docker/check-program.sh).
 test-release:

@@ -28,11 +28,14 @@ COMPILERS = {
     "java": ["javac", "--release", "17", "Agent.java"],
     "csharp": ["mcs", "-out:agent.exe", "Agent.cs"],
 }
+# .NET as a Python package: a runtime of version 3.1, without a compiler.
+DOTNET = "dotnetcore2==3.1.23"
 # Lines that agents print to their logs.
 LOG = {
     "cpp": "hold in C++",
     "csharp": "hold in C#",
     # 510 to 519 million: a quarter of the agent's memory, 2 GiB, less one survivor space.
+    "dotnet": "hold in C#",
     "java": "heap: at most 51",
     "lua": "hold in Lua",
     "node": "interfaces: lo memory: 2147483648",
@@ -60,8 +63,23 @@ def prepare(program, work):
         subprocess.run(["/usr/bin/python3", "-m", "venv", work / "python"], check=True)
         subprocess.run([work / "python/bin/pip", "install", "--quiet", "--requirement", requirements], check=True)
         shutil.copy(requirements, installed)
+    # The same program as for Mono.
+    dotnet = shutil.copytree(work / "agents/csharp", work / "agents/dotnet")
+    (dotnet / "agent.exe").rename(dotnet / "agent.dll")
+    shutil.copy(REPOSITORY / "tests/languages/dotnet/agent.toml", dotnet)
+    shutil.copy(REPOSITORY / "tests/languages/dotnet/agent.runtimeconfig.json", dotnet)
+    if not (work / "dotnet").exists():
+        shutil.rmtree(work / "wheel", ignore_errors=True)
+        pip = [work / "python/bin/pip", "install", "--quiet", "--no-deps", "--target", work / "wheel", DOTNET]
+        subprocess.run(pip, check=True)
+        (work / "wheel/dotnetcore2/bin/dotnet").chmod(0o755)
+        (work / "wheel/dotnetcore2/bin").rename(work / "dotnet")
     recipes = (REPOSITORY / "docker/runtimes/debian.toml").read_text()
-    (work / "faceoff.toml").write_text(f'{recipes}\n[runtimes.libraries]\nfolder = "{work / "python"}"\n')
+    (work / "faceoff.toml").write_text(
+        f'{recipes}\n[runtimes.libraries]\nfolder = "{work / "python"}"\n'
+        f'[runtimes.dotnet]\nread_only_paths = ["/lib", "/lib64", "/usr/lib", "/usr/lib64", "/etc/ld.so.cache", "{work / "dotnet"}"]\n'
+        f'path = "{work / "dotnet"}"\n'
+    )
 
 
 def evaluate(program, work, agent):
@@ -138,6 +156,9 @@ def main():
     passed, failed = 0, 0
     for kind in ("bundle", "image") if arguments.images else ("bundle",):
         for language, line in LOG.items():
+            if (kind, language) == ("image", "dotnet"):
+                # Debian has no package for the image.
+                continue
             try:
                 agent = work / "agents" / language if kind == "bundle" else image_of(work, language)
                 task, log = evaluate(program, work, agent)

@@ -17,8 +17,9 @@ use std::{
 const MAX_ENTRIES: usize = 500_000;
 /// Links that are followed to a program.
 const MAX_LINKS: usize = 40;
-/// Targets are put together by this many components, as in `/etc/java-17-openjdk`.
+/// Targets are put together by this many components, as in `/etc/java-17-openjdk` and `/usr/share/nodejs`.
 const GROUP_COMPONENTS: usize = 3;
+const GROUP_COMPONENTS_BELOW_USR: usize = 4;
 
 /// Links into one folder that agents do not see.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -39,7 +40,8 @@ impl Runtime {
         let mut found: BTreeMap<PathBuf, HiddenTarget> = BTreeMap::new();
         let is_system = |path: &Path| LIBRARY_PATHS.iter().any(|system| path == Path::new(system));
         let mut folders = self.read_only_paths.clone();
-        folders.retain(|path| !is_system(path));
+        // Some of them are links, as `/lib64` to `/usr/lib64`.
+        folders.retain(|path| !is_system(path) || path.is_symlink());
         let programs: Vec<_> = folders
             .iter()
             .filter_map(|path| home_of_program(path))
@@ -52,7 +54,12 @@ impl Runtime {
             };
             if kind.is_symlink() {
                 if let Some(target) = self.hidden_target(&path) {
-                    let group: PathBuf = target.components().take(GROUP_COMPONENTS).collect();
+                    let components = if target.starts_with("/usr") {
+                        GROUP_COMPONENTS_BELOW_USR
+                    } else {
+                        GROUP_COMPONENTS
+                    };
+                    let group: PathBuf = target.components().take(components).collect();
                     let hidden = found.entry(group.clone()).or_insert(HiddenTarget {
                         path: group,
                         link: path,
