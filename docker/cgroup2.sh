@@ -4,6 +4,7 @@
 #
 #   TARGET_DIR=target docker/cgroup2.sh      (after cargo build --workspace --bins --tests; docker/setup.sh cgroup2)
 #
+# CGROUP2_ONLY names cases, separated by spaces, such as `leaf-tests leaf-languages`; by default all are tested.
 # CGROUP2_TIMEOUT_S ends a hanging machine. Kernel and log stay in TARGET_DIR/cgroup2. The CPU is emulated, which takes minutes: if the
 # host is itself a virtual machine, a kernel may hang with /dev/kvm, and this cannot be detected in advance.
 #
@@ -15,7 +16,7 @@
 #   image      as container, through docker/entrypoint.sh, which empties the root and delegates it to an ordinary user; also a busy
 #              cgroup without a namespace, as in privileged pods.
 set -eu
-: "${TARGET_DIR:=target}" "${CGROUP2_TIMEOUT_S:=3600}"
+: "${TARGET_DIR:=target}" "${CGROUP2_ONLY:=}" "${CGROUP2_TIMEOUT_S:=3600}"
 folder=$(dirname "$(realpath "$0")")
 if [ "$(uname -m)" != x86_64 ]; then
     echo "error: this script supports only x86_64, and this is $(uname -m)" >&2
@@ -96,8 +97,8 @@ END
 chmod 755 "$initramfs/init"
 
 {
-    printf "program='%s'\ntests='%s'\nrunner_tests='%s'\nrepository='%s'\nlanguages='%s'\n" "$program" "$tests" "$runner_tests" "$(dirname "$folder")" \
-        "$(realpath -m "$TARGET_DIR/languages")"
+    printf "program='%s'\ntests='%s'\nrunner_tests='%s'\nrepository='%s'\nlanguages='%s'\nonly='%s'\n" "$program" "$tests" "$runner_tests" "$(dirname "$folder")" \
+        "$(realpath -m "$TARGET_DIR/languages")" "$CGROUP2_ONLY"
     cat <<'END'
 set -u
 export PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/run/scratch TMPDIR=/run/scratch
@@ -108,6 +109,10 @@ case_is() { printf '\n===== %s\n' "$*"; }
 expect() { # expect NAME COMMAND…
     name=$1
     shift
+    case " ${only:-$name} " in
+    *" $name "*) ;;
+    *) return ;;
+    esac
     "$@" || failed="$failed $name"
 }
 # The sandbox's tests that use a cgroup: limits, exits, CPUs, and cleanup after a killed service.
