@@ -99,7 +99,7 @@ fn agent_leaves_no_trace_visible_to_another_teams_agent() {
     assert_eq!(first_agent, second_agent);
     // Each call or observation of the program, with its error, its value or `ok`.
     for (call, answer) in [
-        ("flock", "ENOSYS"),
+        ("exclusive_lock_of_file", "ENOSYS"),
         ("lock_query", "ok"),
         ("open_file_lock", "EINVAL"),
         ("read_if_in_memory", "ENOTSUP"),

@@ -56,7 +56,7 @@ pub fn invite_and_join(server: &Server, invite_args: &[&str], name: &str) -> Str
 
 /// Runs a command at a terminal of its own, and types a line at each prompt.
 const TYPIST: &str = r#"
-import os, pty, sys
+import os, pty, sys, termios, time
 
 answers = sys.stdin.read().splitlines()
 child, terminal = pty.fork()
@@ -70,6 +70,9 @@ while True:
         break
     output += chunk
     if output.rstrip().endswith(b"):") or output.rstrip().endswith(b"password:"):
+        # A user does not type before the prompt is complete, with the echo off.
+        while termios.tcgetattr(terminal)[3] & termios.ECHO:
+            time.sleep(0.001)
         os.write(terminal, answers.pop(0).encode() + b"\n")
         output += b"\n."
 print(output.decode())

@@ -462,7 +462,7 @@ fn errno_of(error: &io::Error) -> Errno {
     ) {
         static WARNED: OnceLock<()> = OnceLock::new();
         WARNED.get_or_init(|| {
-            tracing::error!(%error, "cannot answer an agent's system call: a root service needs CAP_SYS_PTRACE");
+            tracing::error!(%error, "cannot answer an agent's system call: a root service needs CAP_SYS_PTRACE, and no filter above it may refuse pidfd_getfd");
         });
         return Errno::NOSYS;
     }

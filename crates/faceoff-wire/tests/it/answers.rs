@@ -315,7 +315,7 @@ fn invalid_json_is_refused_with_a_reason() {
         let Err(AgentFaultKind::NotJson { detail }) = parse(&line) else {
             panic!("expected NotJson");
         };
-        assert!(detail.chars().count() < 340, "{detail}");
+        assert!(detail.chars().count() < 400, "{detail}");
     }
     let mut action = Vec::new();
     let fault = parse_act(

@@ -147,9 +147,11 @@ impl Findings {
             })
             .collect();
         let ok = missing_layers(&features).next().is_none();
+        let unavailable = features.iter().filter(|layer| !layer.feature.available);
+        let unavailable = unavailable.map(|layer| layer.feature.layer).collect();
         Self {
             ok,
-            runtimes: runtime_reports(config, &features),
+            runtimes: runtime_reports(config, unavailable),
             features,
             in_memory: memory_report(config),
             cpus: cpu_report(config),

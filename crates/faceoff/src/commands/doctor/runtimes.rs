@@ -2,7 +2,7 @@
 
 use crate::config::{Config, RuntimeConfig};
 use faceoff_runner::take_inventory;
-use faceoff_sandbox::{HiddenTarget, Isolation, Runtime};
+use faceoff_sandbox::{HiddenTarget, Isolation, Layer, Runtime};
 use faceoff_types::{RuntimeContent, RuntimeInventory};
 use serde::Serialize;
 
@@ -20,15 +20,11 @@ pub(super) struct RuntimeReport {
     pub cure: Option<String>,
 }
 
-/// Inspects each runtime inside the sandbox, with the layers that this host has.
-pub(super) fn runtime_reports(
-    config: &Config,
-    features: &[super::LayerReport],
-) -> Vec<RuntimeReport> {
+/// Inspects each runtime inside the sandbox, without the layers that this host lacks.
+pub(super) fn runtime_reports(config: &Config, missing_layers: Vec<Layer>) -> Vec<RuntimeReport> {
     let mut env = config.agent_environment();
-    let unavailable = features.iter().filter(|layer| !layer.feature.available);
     env.isolation = Isolation::Sandboxed {
-        disabled_layers: unavailable.map(|layer| layer.feature.layer).collect(),
+        disabled_layers: missing_layers,
     };
     let mut found: Vec<_> = take_inventory(&env)
         .into_iter()
