@@ -9,7 +9,7 @@ if [ $# -ne 1 ]; then
 fi
 program=$(realpath "$1")
 golden=$(dirname "$(dirname "$(realpath "$0")")")/tests/golden/simulator.txt
-# Limit for growth by dependencies and generic code; defined only here. The goal is 40,000,000 (docs/contributing/building.md).
+# Limit for growth by dependencies and generic code; defined only here (docs/contributing/building.md).
 most_bytes=40000000
 
 has_defect=''

@@ -1,7 +1,7 @@
 //! Writes the table of characters that look alike, of Unicode's technical standard 39, in the format that `src/look_alikes.rs` reads.
 //!
-//! The crate with the standard's tables has several of them, each entry with an address of its own, which are a hundredth of the released
-//! program. So it is used here only.
+//! The crate with the standard's tables has an address for each character and each text that it resembles, and for each address the program
+//! has an entry by which it is loaded. A text is smaller (docs/contributing/building.md has figures), so the crate is used here only.
 
 use std::{env, error::Error, fs, path::PathBuf};
 use unicode_normalization::UnicodeNormalization;
