@@ -1,5 +1,6 @@
 """Uses the system as programs and runtimes of all languages do: uses_system.py MARK MEMORY_BYTES, with the agent's memory. MARK identifies
 its processes for the test. Reports `ok` or the error for each function by its name."""
+import ctypes
 import errno
 import fcntl
 import http.server
@@ -13,6 +14,9 @@ import threading
 import time
 import urllib.request
 import zoneinfo
+
+
+libc = ctypes.CDLL(None, use_errno=True)
 
 
 def error_of(action):
@@ -57,6 +61,28 @@ def waits_for_locks():
         time.sleep(0.2)
         waiting.kill()
         assert waiting.wait() == -signal.SIGKILL
+
+
+def many_waiting_locks():
+    refused, threads = [], []
+
+    def wait_for_lock():
+        with open("/tmp/many", "w") as file:
+            if error := error_of(lambda: fcntl.flock(file, fcntl.LOCK_EX)):
+                refused.append(error)
+
+    with open("/tmp/many", "w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        threads = [threading.Thread(target=wait_for_lock) for _ in range(40)]
+        [thread.start() for thread in threads]
+        while len(refused) < 8:
+            time.sleep(0.01)
+        fcntl.flock(file, fcntl.LOCK_UN)
+    [thread.join() for thread in threads]
+    assert refused == ["ENOLCK"] * 8, refused
+    # No lock is left behind.
+    with open("/tmp/many") as file:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def locks_of_shared_files():
@@ -125,12 +151,23 @@ def names():
     assert socket.gethostname() == "agent"
     assert socket.gethostbyname("agent") == "127.0.0.1"
     assert socket.gethostbyname("localhost") == "127.0.0.1"
-    assert [name for _, name in socket.if_nameindex()] == ["lo"]
     try:
         socket.gethostbyname("example.org")
     except socket.gaierror:
         return
     raise AssertionError("a name of the internet was found")
+
+
+def connection_limit():
+    """Connections that are never accepted: each has a socket without a descriptor."""
+    with socket.create_server(("127.0.0.1", 0), backlog=4096) as server, socket.socket() as client:
+        refusal, made = None, 0
+        while refusal is None and made < 1000:
+            refusal = error_of(lambda: client.connect(server.getsockname()))
+            made += 1
+            # An address of no family (AF_UNSPEC) ends a connection.
+            libc.connect(client.fileno(), bytes(16), 16)
+    assert refusal == "ENFILE" and made < 256, (refusal, made)
 
 
 def socket_limit():
@@ -200,7 +237,7 @@ def pins():
 
 found = {}
 for task in (
-    file_locks, waits_for_locks, locks_of_shared_files, orphans, connections, web, names, socket_limit, memory, time_zones, log_by_path,
+    file_locks, waits_for_locks, many_waiting_locks, locks_of_shared_files, orphans, connections, web, names, socket_limit, connection_limit, memory, time_zones, log_by_path,
     pins,
 ):
     try:

@@ -1,10 +1,12 @@
 # Prints the version and the packages of this Python as one line of JSON. Packages that agents often use are imported, since files of theirs may
 # be missing or out of an agent's sight.
-import importlib.metadata, json, os, platform, subprocess, sys
+import importlib.metadata, json, os, platform, subprocess, sys, time
 MODULES = {
     "gymnasium": "gymnasium", "h5py": "h5py", "jax": "jax", "numba": "numba", "numpy": "numpy", "onnxruntime": "onnxruntime",
     "pandas": "pandas", "scikit-learn": "sklearn", "scipy": "scipy.linalg", "tensorflow": "tensorflow", "torch": "torch",
 }
+# Packages for which no time is left count as they are installed.
+END = time.monotonic() + 40
 packages, unusable = {}, {}
 for found in importlib.metadata.distributions():
     if found.name:
@@ -12,7 +14,7 @@ for found in importlib.metadata.distributions():
 for name in sorted(packages.keys() & MODULES.keys()):
     # A process each: some end it when they fail, and together they may need more memory than an agent has.
     try:
-        done = subprocess.run([sys.executable, "-c", f"import {MODULES[name]}"], capture_output=True, text=True, timeout=20)
+        done = subprocess.run([sys.executable, "-c", f"import {MODULES[name]}"], capture_output=True, text=True, timeout=max(0, END - time.monotonic()))
     except subprocess.TimeoutExpired:
         continue
     if done.returncode:

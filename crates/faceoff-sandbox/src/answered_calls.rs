@@ -5,7 +5,8 @@
 //!   time.
 //! - `setsid` is executed, but only now and then ([`crate::session_numbers`]).
 //! - `flock` is executed on an agent's own files ([`crate::file_locks`]).
-//! - `socket` of the internet's families is executed up to a number of sockets, whose buffers are memory that all programs of the host share.
+//! - `socket` of the internet's families and `connect` are executed up to a number of sockets, whose buffers are memory that all programs of
+//!   the host share.
 //! - `sched_getaffinity` and `sched_setaffinity` translate the agent's numbers of its CPUs ([`crate::cpu_numbers`]).
 //!
 //! A call waits until this service has answered it. Only the calling thread waits, and the answers are slower the more there are, so
@@ -25,6 +26,7 @@ use crate::{
 };
 use rustix::{
     event::{PollFd, PollFlags, Timespec, poll},
+    fs::{FlockOperation, flock},
     io::Errno,
     net::{
         AddressFamily, RecvAncillaryBuffer, RecvAncillaryMessage, RecvFlags, SendAncillaryBuffer,
@@ -53,7 +55,7 @@ const MAX_NAME_BYTES: u64 = 255;
 /// Flags in `statfs`: the flags are valid, no set-id programs, no devices.
 const MOUNT_FLAGS: u64 = 0x20 | 0x2 | 0x4;
 
-/// Sockets that an agent may have open when it makes another one of the internet's families; a connection accepted by itself comes on top.
+/// Sockets that an agent may have open when it makes another one of the internet's families, or a connection, which makes one, too.
 const MAX_SOCKETS: i32 = 256;
 /// Longest mask of CPUs that is read, in bytes.
 const MAX_MASK_BYTES: usize = 128;
@@ -276,6 +278,8 @@ fn system(memory: MemoryView) -> [u64; 14] {
 enum Reply {
     /// It returns this number.
     Value(i64),
+    /// This file is locked.
+    Locked(OwnedFd),
     Failed(Errno),
     /// The kernel executes it.
     Execute,
@@ -287,6 +291,7 @@ impl From<LockOutcome> for Reply {
     fn from(outcome: LockOutcome) -> Self {
         match outcome {
             LockOutcome::Done => Self::Value(0),
+            LockOutcome::Locked(file) => Self::Locked(file),
             LockOutcome::Failed(error) => Self::Failed(error),
             LockOutcome::Waits => Self::Waits,
         }
@@ -359,10 +364,18 @@ impl Answerer<'_> {
         true
     }
 
-    /// Fails if the thread is dead, or has got a signal; then it repeats its call.
+    /// Sending fails if the thread is dead, or has got a signal; then it repeats its call.
     fn reply(&self, call: u64, reply: Reply) {
         let _ = match reply {
             Reply::Value(value) => send_reply(self.listener, call, Ok(value)),
+            Reply::Locked(file) => {
+                let sent = send_reply(self.listener, call, Ok(0));
+                if sent.is_err() {
+                    // The caller does not know of its lock.
+                    let _ = flock(&file, FlockOperation::NonBlockingUnlock);
+                }
+                sent
+            }
             Reply::Failed(error) => send_reply(self.listener, call, Err(error)),
             Reply::Execute => let_execute(self.listener, call),
             Reply::Waits => Ok(()),
@@ -387,8 +400,14 @@ impl Answerer<'_> {
             libc::SYS_sysinfo => write_figures(caller, first, &self.answers.system),
             libc::SYS_setsid if self.sessions.take(Instant::now()) => Ok(Reply::Execute),
             libc::SYS_setsid => Ok(Reply::Failed(Errno::PERM)),
-            libc::SYS_socket if caller.sockets()? < MAX_SOCKETS => Ok(Reply::Execute),
-            libc::SYS_socket => Ok(Reply::Failed(Errno::NFILE)),
+            libc::SYS_socket | libc::SYS_connect => Ok(match caller.sockets() {
+                Ok(sockets) if sockets < MAX_SOCKETS => Reply::Execute,
+                Ok(_) => Reply::Failed(Errno::NFILE),
+                Err(error) => {
+                    tracing::error!(%error, "cannot count an agent's sockets");
+                    Reply::Failed(Errno::NFILE)
+                }
+            }),
             libc::SYS_flock => {
                 let has_own_files = self.answers.has_own_files;
                 let outcome = self
@@ -416,7 +435,7 @@ impl Answerer<'_> {
             .answers
             .cpus
             .agent_mask(&sched_getaffinity(Some(thread))?);
-        if bytes % 8 != 0 || bytes < mask.len() as u64 {
+        if !bytes.is_multiple_of(8) || bytes < mask.len() as u64 {
             return Ok(Reply::Failed(Errno::INVAL));
         }
         caller.write(address, &mask)?;
@@ -426,11 +445,11 @@ impl Answerer<'_> {
     fn set_affinity(
         &self,
         caller: Caller<'_>,
-        thread: i32,
+        number: i32,
         bytes: u64,
         address: u64,
     ) -> io::Result<Reply> {
-        let Some(thread) = caller.thread(thread)? else {
+        let Some(thread) = caller.thread(number)? else {
             return Ok(Reply::Failed(Errno::SRCH));
         };
         let mut mask = [0; MAX_MASK_BYTES];
@@ -440,7 +459,13 @@ impl Answerer<'_> {
         if set.count() == 0 {
             return Ok(Reply::Failed(Errno::INVAL));
         }
+        let before = sched_getaffinity(Some(thread))?;
         sched_setaffinity(Some(thread), &set)?;
+        if caller.thread(number)? != Some(thread) {
+            // It ended meanwhile, and another process may have its number.
+            let _ = sched_setaffinity(Some(thread), &before);
+            return Ok(Reply::Failed(Errno::SRCH));
+        }
         Ok(Reply::Value(0))
     }
 }

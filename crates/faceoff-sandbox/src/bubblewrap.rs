@@ -68,6 +68,8 @@ const VISIBLE_IN_PROC: [&[&str]; 4] = [
         "vmallocinfo",
     ],
 ];
+/// The sandbox's first process.
+const INIT: &str = "/proc/1";
 /// Terminals, whose number all agents share.
 const TERMINALS: &str = "/dev/pts";
 
@@ -288,6 +290,17 @@ impl CommandLine {
         for file in files {
             self.args(["--ro-bind", "/dev/null", &file]);
         }
+        // The sandbox's first process is bubblewrap's, whose memory an agent, as the same user, could write to.
+        self.args([
+            "--perms",
+            "0555",
+            "--size",
+            "4096",
+            "--tmpfs",
+            INIT,
+            "--remount-ro",
+            INIT,
+        ]);
     }
 
     /// Mounts the snapshots over the host's counters.

@@ -4,7 +4,10 @@
 //! number, and then asks the listener whether the call still waits.
 
 use crate::call_listener::check_waiting;
-use rustix::process::{Pid, PidfdFlags, PidfdGetfdFlags, pidfd_getfd, pidfd_open};
+use rustix::{
+    io::Errno,
+    process::{Pid, PidfdFlags, PidfdGetfdFlags, pidfd_getfd, pidfd_open},
+};
 use std::{
     fs::{self, File},
     io,
@@ -40,14 +43,36 @@ impl Caller<'_> {
         memory.read_exact_at(bytes, address)
     }
 
+    /// Is the open file that the agent names `number` a regular file or a folder on one of these file systems?
+    pub(crate) fn is_file_on(self, number: i32, file_systems: &[u64]) -> io::Result<bool> {
+        let found = match fs::metadata(self.path(&format!("fd/{number}"))) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                return Err(Errno::BADF.into());
+            }
+            found => found?,
+        };
+        Ok((found.is_file() || found.is_dir()) && file_systems.contains(&found.dev()))
+    }
+
     /// A further descriptor of the open file that the agent names `number`.
     pub(crate) fn file(self, number: i32) -> io::Result<OwnedFd> {
+        let process = self.pidfd()?;
+        check_waiting(self.listener, self.id)?;
+        Ok(pidfd_getfd(&process, number, PidfdGetfdFlags::empty())?)
+    }
+
+    /// A descriptor of the thread (Linux 6.9), or of its process, whose first thread may have ended.
+    fn pidfd(self) -> io::Result<OwnedFd> {
+        const THREAD: PidfdFlags = PidfdFlags::from_bits_retain(libc::PIDFD_THREAD);
+        if let Some(thread) = Pid::from_raw(self.thread.cast_signed())
+            && let Ok(found) = pidfd_open(thread, THREAD)
+        {
+            return Ok(found);
+        }
         let status = fs::read_to_string(self.path("status"))?;
         let process = number_after(&status, "Tgid:").and_then(Pid::from_raw);
         let process = process.ok_or(io::ErrorKind::NotFound)?;
-        let process = pidfd_open(process, PidfdFlags::empty())?;
-        check_waiting(self.listener, self.id)?;
-        Ok(pidfd_getfd(&process, number, PidfdGetfdFlags::empty())?)
+        Ok(pidfd_open(process, PidfdFlags::empty())?)
     }
 
     /// The number of the file system of a folder, as the agent sees it.

@@ -17,6 +17,8 @@ use std::{
 
 /// Folders whose file systems are an agent's own.
 const OWN_FOLDERS: [&str; 2] = ["/tmp", "/dev/shm"];
+/// Locks for which an agent's threads may wait at once: each takes a descriptor of the service.
+const MAX_WAITING: usize = 32;
 /// Pause before a lock that is taken is tried again; it doubles with each attempt.
 const FIRST_PAUSE: Duration = Duration::from_millis(1);
 const LONGEST_PAUSE: Duration = Duration::from_millis(50);
@@ -37,10 +39,12 @@ struct WaitingLock {
 }
 
 /// What a call that locks comes to.
-#[derive(Debug, PartialEq, Eq)]
+#[derive(Debug)]
 pub(crate) enum LockOutcome {
     /// The call has succeeded.
     Done,
+    /// The call has locked this file.
+    Locked(OwnedFd),
     Failed(Errno),
     /// It is answered later.
     Waits,
@@ -62,21 +66,24 @@ impl FileLocks {
             libc::LOCK_UN => FlockOperation::NonBlockingUnlock,
             _ => return Ok(LockOutcome::Failed(Errno::INVAL)),
         };
+        let devices: Vec<_> = OWN_FOLDERS
+            .iter()
+            .filter(|_| has_own_files)
+            .filter_map(|folder| caller.file_system(folder).ok())
+            .collect();
+        // Looked at before it is fetched: if the agent closes a socket or a pipe meanwhile, its end here could take long.
+        if !caller.is_file_on(number, &devices)? {
+            return Ok(of_shared_file(operation));
+        }
         let file = caller.file(number)?;
-        let device = fstat(&file)?.st_dev;
-        let is_own = has_own_files
-            && OWN_FOLDERS
-                .iter()
-                .any(|folder| caller.file_system(folder).is_ok_and(|own| own == device));
-        if !is_own {
-            // Nobody can write to it, so a shared lock excludes nobody; it succeeds without effect.
-            return Ok(match operation {
-                FlockOperation::NonBlockingLockExclusive => LockOutcome::Failed(Errno::NOSYS),
-                _ => LockOutcome::Done,
-            });
+        if !devices.contains(&fstat(&file)?.st_dev) {
+            return Ok(of_shared_file(operation));
         }
         match flock(&file, operation) {
-            Ok(()) => Ok(LockOutcome::Done),
+            Ok(()) => Ok(LockOutcome::Locked(file)),
+            Err(Errno::WOULDBLOCK) if may_wait && !self.has_place(caller.listener) => {
+                Ok(LockOutcome::Failed(Errno::NOLCK))
+            }
             Err(Errno::WOULDBLOCK) if may_wait => {
                 self.waiting.push(WaitingLock {
                     call: caller.id,
@@ -91,6 +98,15 @@ impl FileLocks {
         }
     }
 
+    /// May another thread wait? Those that were killed meanwhile are forgotten.
+    fn has_place(&mut self, listener: BorrowedFd<'_>) -> bool {
+        if self.waiting.len() >= MAX_WAITING {
+            self.waiting
+                .retain(|lock| check_waiting(listener, lock.call).is_ok());
+        }
+        self.waiting.len() < MAX_WAITING
+    }
+
     /// When to call [`Self::retry`] next.
     pub(crate) fn next_try_at(&self) -> Option<Instant> {
         self.waiting.iter().map(|lock| lock.next_try_at).min()
@@ -103,25 +119,33 @@ impl FileLocks {
         now: Instant,
     ) -> Vec<(u64, LockOutcome)> {
         let mut answers = Vec::new();
-        self.waiting.retain_mut(|lock| {
+        for mut lock in std::mem::take(&mut self.waiting) {
             if now < lock.next_try_at {
-                return true;
+                self.waiting.push(lock);
+                continue;
             }
             if check_waiting(listener, lock.call).is_err() {
                 // The thread has been killed.
-                return false;
+                continue;
             }
             match flock(&lock.file, lock.operation) {
                 Err(Errno::WOULDBLOCK) => {
                     lock.pause = (lock.pause * 2).min(LONGEST_PAUSE);
                     lock.next_try_at = now + lock.pause;
-                    return true;
+                    self.waiting.push(lock);
                 }
-                Ok(()) => answers.push((lock.call, LockOutcome::Done)),
+                Ok(()) => answers.push((lock.call, LockOutcome::Locked(lock.file))),
                 Err(error) => answers.push((lock.call, LockOutcome::Failed(error))),
             }
-            false
-        });
+        }
         answers
+    }
+}
+
+/// No process can write to a shared file, so a shared lock excludes none; it succeeds without effect.
+fn of_shared_file(operation: FlockOperation) -> LockOutcome {
+    match operation {
+        FlockOperation::NonBlockingLockExclusive => LockOutcome::Failed(Errno::NOSYS),
+        _ => LockOutcome::Done,
     }
 }

@@ -177,7 +177,7 @@ impl Launch {
         } = channel;
         command.process_group(0);
         if spec.logs_output {
-            setup.protocol = Some(ProtocolDescriptors { questions, answers });
+            setup.protocol = Some(ProtocolDescriptors::new(&questions, &answers)?);
             let stdout = stderr
                 .try_clone()
                 .context("cannot pass the agent its log")?;

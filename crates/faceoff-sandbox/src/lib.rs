@@ -73,6 +73,7 @@ pub use line_socket::ReadLine;
 pub use memory_image::{MEMORY_FOLDER, MemoryImage, MemoryImageError};
 pub use probe::{HostFeature, probe_host, unavailable_layers};
 pub use process::{AgentProcess, Usage};
+pub use protocol_descriptors::reserve_protocol_descriptors;
 pub use runtime::{Runtime, RuntimeFiles};
 pub use runtime_links::HiddenTarget;
 pub use spawn_spec::SpawnSpec;

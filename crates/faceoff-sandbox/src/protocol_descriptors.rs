@@ -13,19 +13,28 @@ use std::{
 
 const QUESTIONS: RawFd = 3;
 const ANSWERS: RawFd = 4;
+const ACTION: &str = "cannot reserve file descriptors for the agent's protocol";
 
 /// The agent's ends of the protocol.
 #[derive(Debug)]
 pub(crate) struct ProtocolDescriptors {
-    pub questions: OwnedFd,
-    pub answers: OwnedFd,
+    questions: OwnedFd,
+    answers: OwnedFd,
 }
 
 impl ProtocolDescriptors {
-    /// Reserves both numbers in this process. Call it before anything else is opened for the agent, so that no descriptor that its process
-    /// needs before the exec has one of them.
+    /// The ends, moved to other numbers than those that they get.
+    pub(crate) fn new(questions: &OwnedFd, answers: &OwnedFd) -> Result<Self, SandboxError> {
+        let moved = |end| fcntl_dupfd_cloexec(end, ANSWERS + 1).context(ACTION);
+        Ok(Self {
+            questions: moved(questions)?,
+            answers: moved(answers)?,
+        })
+    }
+
+    /// Reserves both numbers in this process, so that no descriptor that an agent's process needs before its exec has one of them. What has
+    /// them already must keep them: call it before other threads open and close files.
     pub(crate) fn reserve() -> Result<(), SandboxError> {
-        const ACTION: &str = "cannot reserve file descriptors for the agent's protocol";
         static RESERVED: Mutex<Vec<OwnedFd>> = Mutex::new(Vec::new());
         let mut reserved = RESERVED.lock().unwrap_or_else(PoisonError::into_inner);
         let empty =
@@ -52,4 +61,13 @@ impl ProtocolDescriptors {
         }
         Ok(())
     }
+}
+
+/// Keeps the file descriptors 3 and 4 of this process free for agents whose standard output is their log. Call it first in a program; the
+/// start of such an agent calls it, too.
+///
+/// # Errors
+/// When this process may open no further files.
+pub fn reserve_protocol_descriptors() -> Result<(), SandboxError> {
+    ProtocolDescriptors::reserve()
 }

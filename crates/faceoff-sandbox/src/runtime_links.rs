@@ -3,10 +3,8 @@
 //! Distributions keep parts of a program elsewhere and link to them, as from `/usr/lib/jvm` to `/etc`. Inside the sandbox such a link leads
 //! nowhere, and the program fails with an error that names neither.
 
-use crate::{
-    Runtime,
-    runtime::{LIBRARY_PATHS, path_in_image},
-};
+use crate::{Runtime, runtime::LIBRARY_PATHS};
+use rustix::fs::{Mode, OFlags, ResolveFlags, open, openat2};
 use std::{
     collections::BTreeMap,
     fs,
@@ -82,13 +80,17 @@ impl Runtime {
     /// Why a program of this runtime cannot start: `search_path` has no folder with it, or it is a link that leads out of the runtime.
     pub(crate) fn missing_program(&self, program: &str, search_path: &str) -> Option<String> {
         for folder in search_path.split(':') {
-            let mut path = Path::new(folder).join(program);
             if let Some(root) = self.root() {
-                if fs::symlink_metadata(path_in_image(root, &path)).is_ok() {
+                if exists_in(root, &Path::new(folder).join(program)) {
                     return None;
                 }
                 continue;
             }
+            // The bundle may set PATH: it must not ask for other files of the host.
+            let Ok(folder) = fs::canonicalize(folder) else {
+                continue;
+            };
+            let mut path = folder.join(program);
             for _ in 0..MAX_LINKS {
                 if !self.shows(&path) || fs::symlink_metadata(&path).is_err() {
                     break;
@@ -103,7 +105,14 @@ impl Runtime {
                 let Ok(target) = fs::read_link(&path) else {
                     return None;
                 };
-                path = path.parent().unwrap_or(Path::new("/")).join(target);
+                let target = path.parent().unwrap_or(Path::new("/")).join(target);
+                let folder = target
+                    .parent()
+                    .and_then(|folder| fs::canonicalize(folder).ok());
+                let (Some(folder), Some(name)) = (folder, target.file_name()) else {
+                    return None;
+                };
+                path = folder.join(name);
             }
         }
         Some(format!(
@@ -111,6 +120,7 @@ impl Runtime {
         ))
     }
 
+    /// Is `path`, whose folder is canonical, in one that agents see?
     fn shows(&self, path: &Path) -> bool {
         self.read_only_paths
             .iter()
@@ -129,6 +139,18 @@ impl Runtime {
                 .any(|path| fs::canonicalize(path).is_ok_and(|path| target.starts_with(path)));
         (!is_visible && target.exists()).then_some(target)
     }
+}
+
+/// Is there a file at this path in an image? Links are followed inside of the image only.
+fn exists_in(root: &Path, path: &Path) -> bool {
+    let folder = open(
+        root,
+        OFlags::PATH | OFlags::DIRECTORY | OFlags::CLOEXEC,
+        Mode::empty(),
+    );
+    let flags = OFlags::PATH | OFlags::NOFOLLOW | OFlags::CLOEXEC;
+    let within = ResolveFlags::IN_ROOT | ResolveFlags::NO_MAGICLINKS;
+    folder.is_ok_and(|folder| openat2(folder, path, flags, Mode::empty(), within).is_ok())
 }
 
 /// The folder of a program that is installed in one of its own, as `/usr/lib/jvm/java` of `/usr/lib/jvm/java/bin/java`, by which links it

@@ -280,9 +280,19 @@ impl Filters {
             controls.push(rule([argument(1, is_of_kind, kind.cast_signed())])?);
         }
         let unknown_controls = Rules::from([(libc::SYS_ioctl, controls)]);
+        // A message that opens a connection would do so unseen.
+        let opens = SeccompCmpOp::MaskedEq(u64::from(MSG_FASTOPEN.cast_unsigned()));
+        let opens_in = |index| {
+            Ok::<_, SandboxError>(vec![rule([argument(index, opens.clone(), MSG_FASTOPEN)])?])
+        };
         // `preadv2` with flags can read only what is in memory, or keep what it reads out of memory.
         let with_flags = vec![rule([argument(5, SeccompCmpOp::Ne, 0)])?];
-        let read_flags = Rules::from([(libc::SYS_preadv2, with_flags)]);
+        let unsupported_flags = Rules::from([
+            (libc::SYS_preadv2, with_flags),
+            (libc::SYS_sendto, opens_in(3)?),
+            (libc::SYS_sendmsg, opens_in(2)?),
+            (libc::SYS_sendmmsg, opens_in(3)?),
+        ]);
         Ok(Self(vec![
             filter_unknown_calls(),
             compile(any_arguments(&[ABSENT, ABSENT_ON_THIS_ARCH]), libc::ENOSYS)?,
@@ -290,7 +300,7 @@ impl Filters {
             compile(unknown_requests, libc::EINVAL)?,
             compile(unknown_options, libc::ENOPROTOOPT)?,
             compile(unknown_controls, libc::ENOTTY)?,
-            compile(read_flags, libc::EOPNOTSUPP)?,
+            compile(unsupported_flags, libc::EOPNOTSUPP)?,
             // Last, because it refuses `seccomp` itself.
             compile(rules, libc::EPERM)?,
         ]))
@@ -332,39 +342,30 @@ const ANSWERED: &[i64] = &[
     libc::SYS_setsid,
     // whether the file is the agent's own is not in the arguments
     libc::SYS_flock,
+    // a connection within the agent's network makes a further socket
+    libc::SYS_connect,
 ];
 /// Calls that contain numbers of CPUs.
 const AFFINITY: &[i64] = &[libc::SYS_sched_getaffinity, libc::SYS_sched_setaffinity];
 
+/// A flag of a message.
+const MSG_FASTOPEN: libc::c_int = 0x2000_0000;
 /// The families of sockets of the internet.
 const INTERNET: [libc::c_int; 2] = [libc::AF_INET, libc::AF_INET6];
-/// The only further family beside local sockets: programs list the interfaces of their own network by it.
-const NETLINK: libc::c_int = libc::AF_NETLINK;
-/// Types of sockets (the lower four bits of the argument) of which the kernel would load modules, or that need rights.
-const REFUSED_TYPES: [libc::c_int; 4] = [
-    libc::SOCK_RAW,
-    libc::SOCK_SEQPACKET,
-    libc::SOCK_DCCP,
-    SOCK_PACKET,
-];
-/// Deprecated in `libc`, since it is superseded.
-const SOCK_PACKET: libc::c_int = 10;
+/// The type of a socket: the lower four bits of the argument. The kernel would load modules for types other than streams and datagrams.
 const SOCKET_TYPE: u64 = 0xf;
 
-/// Sockets that are refused. Those of the internet reach the agent's own network only, in which nobody else is.
+/// Sockets that are refused. Those of the internet reach the agent's own network only. `NETLINK_ROUTE`, by which programs list interfaces,
+/// also shows counters of the neighbours of all networks of the host.
 fn refused_sockets() -> Result<Vec<SeccompRule>, SandboxError> {
-    let families = [libc::AF_UNIX, NETLINK, INTERNET[0], INTERNET[1]];
+    let families = [libc::AF_UNIX, INTERNET[0], INTERNET[1]];
     let other = families.map(|family| argument(0, SeccompCmpOp::Ne, family));
-    // Routing only, which is protocol 0.
-    let other_netlink = [
-        argument(0, SeccompCmpOp::Eq, NETLINK),
-        argument(2, SeccompCmpOp::Ne, libc::NETLINK_ROUTE),
-    ];
-    let mut rules = vec![rule(other)?, rule(other_netlink)?];
+    let mut rules = vec![rule(other)?];
+    let allowed_types = [libc::SOCK_STREAM, libc::SOCK_DGRAM];
     let of_type = |kind| argument(1, SeccompCmpOp::MaskedEq(SOCKET_TYPE), kind);
     for family in INTERNET {
         let of_family = || argument(0, SeccompCmpOp::Eq, family);
-        for kind in REFUSED_TYPES {
+        for kind in (0..=SOCKET_TYPE as libc::c_int).filter(|kind| !allowed_types.contains(kind)) {
             rules.push(rule([of_family(), of_type(kind)])?);
         }
         for (kind, protocol) in [

@@ -64,7 +64,8 @@ impl StatusPipe {
     }
 
     /// The agent's exit code, if it was started and has ended; 128 + signal after a signal. Valid only after
-    /// bubblewrap has ended.
+    /// bubblewrap has ended. An agent that took over the sandbox's first process could state any number, even a negative one; it is the
+    /// agent's exit in any case.
     pub(crate) fn exit_code(&mut self) -> Option<i32> {
         while !self.is_closed && matches!(self.fill(), Ok(true)) {}
         self.number("exit-code")
@@ -93,7 +94,7 @@ impl StatusPipe {
     fn number(&self, key: &str) -> Option<i32> {
         let text = std::str::from_utf8(&self.text).ok()?;
         let rest = text.split_once(&format!("\"{key}\":"))?.1.trim_start();
-        let digits = rest.find(|c: char| !c.is_ascii_digit())?;
-        rest[..digits].parse().ok()
+        let end = rest.find(|c: char| c != '-' && !c.is_ascii_digit())?;
+        rest[..end].parse().ok()
     }
 }

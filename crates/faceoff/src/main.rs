@@ -92,6 +92,8 @@ enum Command {
 }
 
 fn main() -> ExitCode {
+    // Before threads open files. If it fails, the start of an agent that needs it says so.
+    let _ = faceoff_sandbox::reserve_protocol_descriptors();
     let outcome = match Cli::parse().command {
         Command::Serve(command) => command.run(),
         Command::Worker(command) => command.run(),

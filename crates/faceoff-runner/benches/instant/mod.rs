@@ -2,7 +2,7 @@
 
 use faceoff_runner::{AgentEnvironment, Supervision, TimeLimits, bundle::Bundle};
 use faceoff_sandbox::{Isolation, Limits, Runtime};
-use faceoff_wire::Manifest;
+use faceoff_wire::{Manifest, StandardOutput};
 use std::{
     collections::BTreeMap,
     fs,
@@ -65,6 +65,7 @@ impl InstantAgent {
             command: vec!["./agent".into(), "--agent".into()],
             runtime: "native".into(),
             interpolation: Some(3),
+            stdout: StandardOutput::Answers,
             env: BTreeMap::new(),
         };
         let bundle = Bundle {

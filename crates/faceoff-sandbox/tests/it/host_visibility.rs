@@ -58,17 +58,8 @@ fn agent_sees_only_its_bundle_and_runtime() {
     assert_eq!(names("environs"), expected);
     // The first process is bubblewrap's, which reaps others.
     assert_eq!(report["processes"], serde_json::json!(["1", "2"]));
-    let init = &report["init"];
-    assert_eq!(init["capabilities"], "0000000000000000");
-    assert_eq!(init["filters"], report["status"]["Seccomp_filters"]);
-    let command_line = init["command_line"].as_str().unwrap();
-    let words: Vec<_> = command_line.split(' ').collect();
-    assert_eq!(
-        (words[1], &words[3..6]),
-        ("--args", &["--", "python3", "reads_host.py"][..])
-    );
-    let bundle = subject.bundle.path().to_str().unwrap();
-    assert!(!command_line.contains(bundle), "{command_line}");
+    // Its memory, with which an agent could forge its exit, is out of reach.
+    assert_eq!(report["init"], serde_json::json!([]));
     assert_eq!(report["directory"], "/agent");
     assert_eq!(report["bundle"], serde_json::json!(["reads_host.py"]));
     assert_eq!(report["passwd"], "agent:x:1000:1000:agent:/tmp:/bin/sh\n");
