@@ -98,3 +98,25 @@ impl StatusPipe {
         rest[..end].parse().ok()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rustix::io::write;
+
+    #[test]
+    fn any_stated_exit_code_is_the_agents() {
+        for code in [0, 137, -6, 4096] {
+            let (mut status, writer) = StatusPipe::new().unwrap();
+            let text = format!("{{ \"child-pid\": 77 }}\n{{ \"exit-code\": {code} }}\n");
+            write(&writer, text.as_bytes()).unwrap();
+            drop(writer);
+            let child = status.wait_for_child(Instant::now()).unwrap();
+            assert_eq!(child, Pid::from_raw(77));
+            assert_eq!(status.exit_code(), Some(code));
+        }
+        let (mut ended, writer) = StatusPipe::new().unwrap();
+        drop(writer);
+        assert_eq!(ended.exit_code(), None);
+    }
+}
