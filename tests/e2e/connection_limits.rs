@@ -24,7 +24,7 @@ use std::{
 /// Number of idle or slow connections: as many as once made evaluations fail for lack of descriptors.
 const CONNECTIONS: usize = 190;
 /// The server's limit of open file descriptors.
-const DESCRIPTORS: u32 = 300;
+const DESCRIPTORS: u32 = 370;
 /// Number of addresses from which the clients connect. Each address may have a share of the server's connections; together
 /// they try to use all.
 const ADDRESSES: u8 = 5;
