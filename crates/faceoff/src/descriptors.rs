@@ -107,14 +107,14 @@ mod tests {
         let divide = |limit, slots| Descriptors::divide(limit, slots, &requested);
         let large = divide(65_536, 4).unwrap();
         assert_eq!((large.connections, large.per_address), (1024, 64));
-        // 300 - 64 - 160 descriptors remain for 25 connections, of which an address gets a quarter.
-        let small = divide(300, 1).unwrap();
+        // 370 - 64 - 230 descriptors remain for 25 connections, of which an address gets a quarter.
+        let small = divide(370, 1).unwrap();
         assert_eq!(
             (small.reserved, small.connections, small.per_address),
-            (224, 25, 6)
+            (294, 25, 6)
         );
-        let error = divide(240, 1).unwrap_err().to_string();
+        let error = divide(310, 1).unwrap_err().to_string();
         assert!(error.contains("ulimit -n"), "{error}");
-        assert!(divide(300, 2).is_err());
+        assert!(divide(370, 2).is_err());
     }
 }
