@@ -31,7 +31,6 @@ print(json.dumps({
     "tcp6": attempt(socket.AF_INET6, socket.SOCK_STREAM, ("::1", port)),
     "udp": attempt(socket.AF_INET, socket.SOCK_DGRAM, ("127.0.0.1", port)),
     "raw": attempt(socket.AF_INET, socket.SOCK_RAW, ("127.0.0.1", port), 1),
-    "routing": attempt(AF_NETLINK, socket.SOCK_RAW, (0, 0), 0),
     "reliable": attempt(socket.AF_INET, 4, ("127.0.0.1", port), 132),
     "diagnosis": attempt(AF_NETLINK, socket.SOCK_RAW, (0, 0), 4),
     "sctp": attempt(socket.AF_INET, socket.SOCK_SEQPACKET, ("127.0.0.1", port), 132),

@@ -8,6 +8,7 @@ import json
 import os
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import threading
@@ -158,6 +159,17 @@ def names():
     raise AssertionError("a name of the internet was found")
 
 
+def interfaces():
+    for _ in range(20):
+        assert [name for _, name in socket.if_nameindex()] == ["lo"]
+    ask_for_neighbour_tables, dump, done = 66, 0x301, 3
+    with socket.socket(16, socket.SOCK_RAW | socket.SOCK_CLOEXEC, 0) as route:
+        route.send(struct.pack("=IHHIIB3x", 20, ask_for_neighbour_tables, dump, 1, 0, 0))
+        # Tables come before the end of the list.
+        assert struct.unpack_from("=IH", route.recv(1 << 16))[1] == done
+        assert error_of(lambda: route.setsockopt(socket.SOL_SOCKET, 27, 0)) == "EPERM"
+
+
 def connection_limit():
     """Connections that are never accepted: each has a socket without a descriptor."""
     with socket.create_server(("127.0.0.1", 0), backlog=4096) as server, socket.socket() as client:
@@ -237,7 +249,7 @@ def pins():
 
 found = {}
 for task in (
-    file_locks, waits_for_locks, many_waiting_locks, locks_of_shared_files, orphans, connections, web, names, socket_limit, connection_limit, memory, time_zones, log_by_path,
+    file_locks, waits_for_locks, many_waiting_locks, locks_of_shared_files, orphans, connections, web, names, interfaces, socket_limit, connection_limit, memory, time_zones, log_by_path,
     pins,
 ):
     try:

@@ -38,7 +38,7 @@ LOG = {
     "dotnet": "hold in C#",
     "java": "heap: at most 51",
     "lua": "hold in Lua",
-    "node": "memory: 2147483648",
+    "node": "interfaces: lo memory: 2147483648",
     "python": "messages work",
     "rust": "",
 }

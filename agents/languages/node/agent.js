@@ -8,7 +8,7 @@ const readline = require("node:readline");
 const questions = readline.createInterface({ input: new net.Socket({ fd: 3, readable: true }) });
 const say = (message) => fs.writeSync(4, JSON.stringify(message) + "\n");
 
-console.log("memory:", os.totalmem());
+console.log("interfaces:", Object.keys(os.networkInterfaces()).join(), "memory:", os.totalmem());
 
 let joints = [];
 let pose = null;

@@ -7,6 +7,7 @@
 //! - `flock` is executed on an agent's own files ([`crate::file_locks`]).
 //! - `socket` of the internet's families and `connect` are executed up to a number of sockets, whose buffers are memory that all programs of
 //!   the host share.
+//! - `socket` of `NETLINK_ROUTE` gives a socket that the service has made ([`crate::route_sockets`]).
 //! - `sched_getaffinity` and `sched_setaffinity` translate the agent's numbers of its CPUs ([`crate::cpu_numbers`]).
 //!
 //! A call waits until this service has answered it. Only the calling thread waits, and the answers are slower the more there are, so
@@ -14,14 +15,14 @@
 
 use crate::{
     Layer, SandboxError, SpawnSpec,
-    call_listener::{install_with_listener, let_execute, receive_call, send_reply},
+    call_listener::{install_with_listener, let_execute, receive_call, send_file, send_reply},
     caller::Caller,
     cpu_clock::own_cpu_time,
     cpu_numbers::CpuNumbers,
     error::IoContext,
     file_locks::{FileLocks, LockOutcome},
     memory_view::MemoryView,
-    seccomp,
+    route_sockets, seccomp,
     session_numbers::{self, SessionBudget},
 };
 use rustix::{
@@ -280,6 +281,11 @@ enum Reply {
     Value(i64),
     /// This file is locked.
     Locked(OwnedFd),
+    /// It returns a descriptor of this file.
+    File {
+        file: OwnedFd,
+        closes_on_exec: bool,
+    },
     Failed(Errno),
     /// The kernel executes it.
     Execute,
@@ -376,6 +382,10 @@ impl Answerer<'_> {
                 }
                 sent
             }
+            Reply::File {
+                file,
+                closes_on_exec,
+            } => send_file(self.listener, call, file, closes_on_exec),
             Reply::Failed(error) => send_reply(self.listener, call, Err(error)),
             Reply::Execute => let_execute(self.listener, call),
             Reply::Waits => Ok(()),
@@ -400,6 +410,14 @@ impl Answerer<'_> {
             libc::SYS_sysinfo => write_figures(caller, first, &self.answers.system),
             libc::SYS_setsid if self.sessions.take(Instant::now()) => Ok(Reply::Execute),
             libc::SYS_setsid => Ok(Reply::Failed(Errno::PERM)),
+            libc::SYS_socket if int(first) == libc::AF_NETLINK => {
+                let kind = int(second);
+                let socket = route_sockets::make(caller, kind & libc::SOCK_NONBLOCK != 0)?;
+                Ok(Reply::File {
+                    file: socket,
+                    closes_on_exec: kind & libc::SOCK_CLOEXEC != 0,
+                })
+            }
             libc::SYS_socket | libc::SYS_connect => Ok(match caller.sockets() {
                 Ok(sockets) if sockets < MAX_SOCKETS => Reply::Execute,
                 Ok(_) => Reply::Failed(Errno::NFILE),

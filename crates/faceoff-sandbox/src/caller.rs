@@ -114,6 +114,13 @@ impl Caller<'_> {
         Ok(found.and_then(Pid::from_raw))
     }
 
+    /// Opens a file of the thread's folder in `/proc`.
+    pub(crate) fn open(self, name: &str) -> io::Result<File> {
+        let file = File::open(self.path(name))?;
+        check_waiting(self.listener, self.id)?;
+        Ok(file)
+    }
+
     fn path(self, name: &str) -> PathBuf {
         PathBuf::from(format!("/proc/{}/{name}", self.thread))
     }

@@ -49,6 +49,7 @@ mod process;
 mod process_tree;
 mod program_file;
 mod protocol_descriptors;
+mod route_sockets;
 mod runtime;
 mod runtime_links;
 mod sched_stat;

@@ -324,7 +324,8 @@ pub(crate) fn answered_calls(renumbers_cpus: bool) -> Result<BpfProgram, Sandbox
     const PLACEHOLDER: u32 = 4095;
     let affinity: &[i64] = if renumbers_cpus { AFFINITY } else { &[] };
     let mut rules = any_arguments(&[ANSWERED, affinity]);
-    rules.insert(libc::SYS_socket, one_of(0, &INTERNET)?);
+    let [four, six] = INTERNET;
+    rules.insert(libc::SYS_socket, one_of(0, &[four, six, libc::AF_NETLINK])?);
     let mut program = compile(rules, PLACEHOLDER.cast_signed())?;
     for instruction in &mut program {
         if instruction.k == libc::SECCOMP_RET_ERRNO | PLACEHOLDER {
@@ -355,12 +356,16 @@ const INTERNET: [libc::c_int; 2] = [libc::AF_INET, libc::AF_INET6];
 /// The type of a socket: the lower four bits of the argument. The kernel would load modules for types other than streams and datagrams.
 const SOCKET_TYPE: u64 = 0xf;
 
-/// Sockets that are refused. Those of the internet reach the agent's own network only. `NETLINK_ROUTE`, by which programs list interfaces,
-/// also shows counters of the neighbours of all networks of the host.
+/// Sockets that are refused. Those of the internet reach the agent's own network only; those of `NETLINK_ROUTE` are made by the service
+/// ([`crate::route_sockets`]).
 fn refused_sockets() -> Result<Vec<SeccompRule>, SandboxError> {
-    let families = [libc::AF_UNIX, INTERNET[0], INTERNET[1]];
+    let families = [libc::AF_UNIX, libc::AF_NETLINK, INTERNET[0], INTERNET[1]];
     let other = families.map(|family| argument(0, SeccompCmpOp::Ne, family));
-    let mut rules = vec![rule(other)?];
+    let other_netlink = [
+        argument(0, SeccompCmpOp::Eq, libc::AF_NETLINK),
+        argument(2, SeccompCmpOp::Ne, libc::NETLINK_ROUTE),
+    ];
+    let mut rules = vec![rule(other)?, rule(other_netlink)?];
     let allowed_types = [libc::SOCK_STREAM, libc::SOCK_DGRAM];
     let of_type = |kind| argument(1, SeccompCmpOp::MaskedEq(SOCKET_TYPE), kind);
     for family in INTERNET {

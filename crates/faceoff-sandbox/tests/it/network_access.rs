@@ -30,7 +30,6 @@ fn agent_reaches_no_network_and_no_host_socket() {
     // The listeners are active, so only the sandbox can prevent a connection.
     for kind in [
         "raw",
-        "routing",
         "reliable",
         "diagnosis",
         "sctp",
