@@ -165,8 +165,12 @@ def interfaces():
     ask_for_neighbour_tables, dump, done = 66, 0x301, 3
     with socket.socket(16, socket.SOCK_RAW | socket.SOCK_CLOEXEC, 0) as route:
         route.send(struct.pack("=IHHIIB3x", 20, ask_for_neighbour_tables, dump, 1, 0, 0))
-        # Tables come before the end of the list.
-        assert struct.unpack_from("=IH", route.recv(1 << 16))[1] == done
+        # The end of the list comes with the tables, which are hidden, or alone.
+        route.settimeout(0.2)
+        try:
+            assert struct.unpack_from("=IH", route.recv(1 << 16))[1] == done
+        except TimeoutError:
+            pass
         assert error_of(lambda: route.setsockopt(socket.SOL_SOCKET, 27, 0)) == "EPERM"
 
 
