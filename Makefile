@@ -98,7 +98,7 @@ test-first-hour: setup
 	python3 tests/first_hour/first_hour.py --program "$(TARGET_DIR)/debug/faceoff" --cache "$(TARGET_DIR)/first-hour" --suite $(SUITE)
 	python3 tests/first_hour/hosts.py --program "$(TARGET_DIR)/debug/faceoff" --cache "$(TARGET_DIR)/first-hour" --suite $(SUITE)
 
-# Agents in all languages, as bundles and as container images. As root: the images' Debian is made from its packages. Not below /tmp.
+# Agents in all languages, as bundles and as container images. As root: the images' Debian is made from its packages.
 test-languages: setup
 	@docker/setup.sh languages
 	$(CARGO) build --locked --workspace --bins --tests

@@ -6,7 +6,7 @@ with those of agents/hold: all of them hold the pose in which an episode starts,
 --images    also plays them as container images with the same packages, made by mmdebstrap (as root)
 --prepared  compiles nothing and installs nothing: an earlier run has filled the work folder
 
-The work folder must not be below /tmp, because agents have a folder of their own there.
+Agents have a folder of their own at /tmp. So for a work folder below it, the user's cache is used instead.
 """
 import argparse
 import hashlib
@@ -151,6 +151,8 @@ def main():
     parser.add_argument("--prepared", action="store_true")
     arguments = parser.parse_args()
     program, work = arguments.program.resolve(), arguments.work.resolve()
+    if work.is_relative_to("/tmp"):
+        work = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "faceoff/languages")
     work.mkdir(parents=True, exist_ok=True)
     if not arguments.prepared:
         prepare(program, work)
