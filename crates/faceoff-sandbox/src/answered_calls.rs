@@ -99,7 +99,7 @@ impl AnsweredCalls {
             file_system: file_system(free_blocks(spec.limits.scratch_bytes)),
             system: system(MemoryView::new(spec)),
             cpus,
-            has_own_files: spec.isolation.enforces(Layer::Namespaces),
+            has_namespaces: spec.isolation.enforces(Layer::Namespaces),
         };
         Ok((
             Self {
@@ -210,8 +210,8 @@ struct Answers {
     file_system: [u64; 15],
     system: [u64; 14],
     cpus: CpuNumbers,
-    /// Are its scratch folders its own?
-    has_own_files: bool,
+    /// Are its scratch folders and its network its own?
+    has_namespaces: bool,
 }
 
 /// The answer of `statfs` and `fstatfs`: an empty file system of so many blocks. On 64-bit machines the fields of the kernel's structure are
@@ -418,6 +418,8 @@ impl Answerer<'_> {
                     closes_on_exec: kind & libc::SOCK_CLOEXEC != 0,
                 })
             }
+            // Without namespaces the network is the host's, and only local sockets are allowed.
+            libc::SYS_connect if !self.answers.has_namespaces => Ok(Reply::Execute),
             libc::SYS_socket | libc::SYS_connect => Ok(match caller.sockets() {
                 Ok(sockets) if sockets < MAX_SOCKETS => Reply::Execute,
                 Ok(_) => Reply::Failed(Errno::NFILE),
@@ -427,7 +429,7 @@ impl Answerer<'_> {
                 }
             }),
             libc::SYS_flock => {
-                let has_own_files = self.answers.has_own_files;
+                let has_own_files = self.answers.has_namespaces;
                 let outcome = self
                     .locks
                     .lock(caller, int(first), int(second), has_own_files)?;
