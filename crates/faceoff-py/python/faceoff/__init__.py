@@ -38,5 +38,7 @@ def __getattr__(name: str) -> Any:
     if name == "__version__":
         from importlib.metadata import version
 
-        return version("faceoff")
+        from faceoff._distribution import DISTRIBUTION
+
+        return version(DISTRIBUTION)
     raise AttributeError(f"module 'faceoff' has no attribute {name!r}")

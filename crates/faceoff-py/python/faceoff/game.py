@@ -26,13 +26,14 @@ from faceoff._arguments import (
     perturbations_json,
     seed_number,
 )
+from faceoff._distribution import install_command
 from faceoff.errors import ArgumentError, ArgumentTypeError, ClosedError, MissingError, OrderError
 
 try:
     import gymnasium
     from pettingzoo import ParallelEnv
 except ImportError as error:  # pragma: no cover - depends on what is installed
-    raise MissingError("faceoff.game needs gymnasium and pettingzoo: pip install 'faceoff[games]'") from error
+    raise MissingError(f"faceoff.game needs gymnasium and pettingzoo: {install_command('games')}") from error
 
 from faceoff.gym.reward import State
 from faceoff.gym.spaces import action_space, game_observation_space

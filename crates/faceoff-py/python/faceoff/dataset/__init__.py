@@ -7,7 +7,7 @@
         print(episode.index, episode.end, episode.success, episode.steps)
     arrays = dataset.episode("hit", 0).to_numpy()
 
-Needs pyarrow 12 or newer (``pip install 'faceoff[dataset]'``); pandas, polars and minari only for the
+Needs pyarrow 12 or newer (``pip install 'faceoff-robotics[dataset]'``); pandas, polars and minari only for the
 functions that use them. The simulator is not needed: this package never imports ``faceoff._native``.
 ``python -m faceoff.dataset`` does the same from the command line. The layouts are described in
 ``docs/dataset.md``.
@@ -22,7 +22,9 @@ from faceoff.errors import MissingError
 try:
     import pyarrow as _pyarrow
 except ImportError as error:
-    raise MissingError("faceoff.dataset needs pyarrow: pip install 'faceoff[dataset]'") from error
+    from faceoff._distribution import install_command
+
+    raise MissingError(f"faceoff.dataset needs pyarrow: {install_command('dataset')}") from error
 
 from ._container import MANIFEST as _MANIFEST
 from ._container import find as _find

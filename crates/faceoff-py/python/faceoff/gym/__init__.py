@@ -17,9 +17,10 @@ from typing import TYPE_CHECKING, Any
 try:
     import gymnasium
 except ImportError as error:  # pragma: no cover - depends on what is installed
+    from faceoff._distribution import install_command
     from faceoff.errors import MissingError
 
-    raise MissingError("faceoff.gym needs gymnasium: pip install 'faceoff[gym]'") from error
+    raise MissingError(f"faceoff.gym needs gymnasium: {install_command('gym')}") from error
 
 from faceoff.gym.env import AirHockeyEnv
 from faceoff.gym.reward import CONSTRAINTS, Reward, State, Transition

@@ -15,7 +15,7 @@ impl MovedExportArgs {
     pub fn run(self) -> anyhow::Result<()> {
         let Self { arguments: _ } = self;
         anyhow::bail!(
-            "the Python package exports other layouts: pip install 'faceoff[dataset]', then \
+            "the Python package exports other layouts: pip install 'faceoff-robotics[dataset]', then \
              python -m faceoff.dataset export DATASET --layout 2023 --out DIR (or minari, lerobot)"
         )
     }
