@@ -10,7 +10,7 @@ mod actions;
 mod batch;
 mod errors;
 mod evaluate;
-mod game;
+mod games;
 mod kinematics;
 mod observation;
 mod outputs;
@@ -30,6 +30,7 @@ use pyo3::prelude::*;
 mod _native {
     use crate::{
         errors::{argument_error, catch_panic},
+        games::{GAME_FACTS, GAME_STATE_LEN, RALLY_ENDS},
         observation::BOUNDS,
         outputs::FACTS,
         world::STATE_LEN,
@@ -41,7 +42,7 @@ mod _native {
     use crate::{
         batch::Batch,
         evaluate::{Evaluation, PolicyEpisode},
-        game::Game,
+        games::{GameSnapshot, Games, load_game},
         kinematics::{
             arm_constants, arm_constraints, arm_forward, arm_frames, arm_heights, arm_inverse,
             arm_jacobian, arm_posture_velocities, arm_velocities,
@@ -95,6 +96,9 @@ mod _native {
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
         module.add("ENDS", ends)?;
         module.add("FACTS", FACTS)?;
+        module.add("GAME_FACTS", GAME_FACTS)?;
+        module.add("GAME_STATE_LEN", GAME_STATE_LEN)?;
+        module.add("RALLY_ENDS", RALLY_ENDS)?;
         module.add("STATE_LEN", STATE_LEN)?;
         module.add("EPISODE_STEPS", EPISODE_STEPS)
     }

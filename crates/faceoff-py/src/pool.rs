@@ -56,6 +56,17 @@ impl Pool {
     }
 }
 
+/// The pool, or `None` for a single thread, where the calling thread does the work.
+///
+/// # Errors
+/// If the system cannot start threads.
+pub fn pool_if_parallel(pool: &mut Pool) -> PyResult<Option<&ThreadPool>> {
+    match pool.threads() {
+        1 => Ok(None),
+        _ => pool.get_or_start().map(Some),
+    }
+}
+
 impl Drop for Pool {
     fn drop(&mut self) {
         self.forget_inherited();

@@ -50,20 +50,7 @@ impl Setup {
                 setup.max_episode_steps,
             ));
         }
-        check_perturbations(&setup.perturbations)?;
-        let magnitudes = &setup.perturbations;
-        let is_drawn = setup.factors.contains(&Factor::ModelMismatch);
-        // Thousands of unsuccessful draws would look like a hang.
-        if is_drawn
-            && magnitudes.model_mismatch != PerturbationSettings::default().model_mismatch
-            && !Plant::can_be_drawn(magnitudes, Seed::from_number(0))
-        {
-            return Err(argument_error(
-                "perturbations",
-                "magnitudes of model_mismatch that allow a plant with this static error",
-                "magnitudes for which no plant was found",
-            ));
-        }
+        check_magnitudes(&setup.factors, &setup.perturbations)?;
         Ok(setup)
     }
 
@@ -118,4 +105,24 @@ impl Setup {
             ),
         }
     }
+}
+
+/// Refuses magnitudes that are out of range, or for which no plant is found.
+///
+/// # Errors
+/// If they are invalid.
+pub fn check_magnitudes(factors: &[Factor], magnitudes: &PerturbationSettings) -> PyResult<()> {
+    check_perturbations(magnitudes)?;
+    // Thousands of unsuccessful draws would look like a hang.
+    if factors.contains(&Factor::ModelMismatch)
+        && magnitudes.model_mismatch != PerturbationSettings::default().model_mismatch
+        && !Plant::can_be_drawn(magnitudes, Seed::from_number(0))
+    {
+        return Err(argument_error(
+            "perturbations",
+            "magnitudes of model_mismatch that allow a plant with this static error",
+            "magnitudes for which no plant was found",
+        ));
+    }
+    Ok(())
 }

@@ -1,17 +1,17 @@
 //! A control step, 20 ms, of several worlds.
 
 use crate::{
+    errors::argument_error,
     outputs::{FACTS, Outputs, write_facts},
     setup::Setup,
     world::World,
 };
 use faceoff_sim::{ConstraintValues, Episode, StepOutcome, step_episodes};
 use faceoff_types::EpisodeEnd;
-use serde::Deserialize;
+use pyo3::prelude::*;
 
 /// When a world whose episode has ended begins the next one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Autoreset {
     /// The next step begins the next episode and ignores the action.
     NextStep,
@@ -19,6 +19,21 @@ pub enum Autoreset {
     SameStep,
     /// Only a reset begins the next episode; steps before it are refused.
     Disabled,
+}
+
+impl Autoreset {
+    /// The mode with this name.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn read(name: &str) -> PyResult<Self> {
+        match name {
+            "next_step" => Ok(Self::NextStep),
+            "same_step" => Ok(Self::SameStep),
+            "disabled" => Ok(Self::Disabled),
+            other => Err(argument_error("autoreset_mode", "an AutoresetMode", other)),
+        }
+    }
 }
 
 /// Steps consecutive worlds; `actions` is [worlds][action], checked.

@@ -5,7 +5,7 @@ use crate::{
         ClosedError, OrderError, argument_error, catch_panic, panic_message, simulator_error,
     },
     outputs::{OwnedRows, chunks_with_worlds},
-    pool::Pool,
+    pool::{Pool, pool_if_parallel},
     rows::Rows,
     setup::Setup,
     snapshot::Snapshot,
@@ -64,18 +64,12 @@ impl Worlds {
     /// Arguments were checked by the Python half. The first reset creates the worlds.
     #[new]
     fn new(setup: &str, count: usize, threads: usize, autoreset: &str) -> PyResult<Self> {
-        let autoreset = match autoreset {
-            "next_step" => Autoreset::NextStep,
-            "same_step" => Autoreset::SameStep,
-            "disabled" => Autoreset::Disabled,
-            other => return Err(argument_error("autoreset_mode", "an AutoresetMode", other)),
-        };
         if count == 0 || threads == 0 {
             return Err(argument_error("num_envs, threads", "at least 1", 0));
         }
         Ok(Self {
             setup: Arc::new(Setup::read(setup)?),
-            autoreset,
+            autoreset: Autoreset::read(autoreset)?,
             count,
             pool: Pool::new(threads),
             state: State::Idle(Vec::new()),
@@ -409,14 +403,6 @@ fn check_call_order(worlds: &[World], autoreset: Autoreset) -> PyResult<()> {
 
 fn missing_reset_error() -> PyErr {
     OrderError::new_err("expected reset() first, got another call")
-}
-
-/// The pool, or `None` for a single thread, where the calling thread does the work.
-fn pool_if_parallel(pool: &mut Pool) -> PyResult<Option<&rayon::ThreadPool>> {
-    match pool.threads() {
-        1 => Ok(None),
-        _ => pool.get_or_start().map(Some),
-    }
 }
 
 fn worlds_per_chunk(worlds: usize, threads: usize) -> usize {

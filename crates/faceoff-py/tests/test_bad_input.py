@@ -31,7 +31,7 @@ ARGUMENTS: list[tuple[dict[str, Any], str]] = [
     ({"perturbations": [1]}, "perturbations: expected a mapping"),
     ({"perturbations": {"noise": {}}}, "unknown field"),
     ({"perturbations": {"tracking_loss": {"probability": 2.0}}}, "expected a number from 0 to 1, got 2"),
-    ({"perturbations": {"tracking_loss": {"probability": float("nan")}}}, "perturbations: expected finite"),
+    ({"perturbations": {"tracking_loss": {"probability": float("nan")}}}, r"perturbations['tracking_loss']['probability']: expected finite"),
     ({"mismatch_seed": "ff"}, "mismatch_seed: expected a number or 64 hexadecimal digits"),
     ({"mismatch_seed": -1}, "mismatch_seed: expected"),
     ({"max_episode_steps": 0}, "max_episode_steps: expected a whole number from 1 to 500, got 0"),
@@ -61,7 +61,8 @@ def test_impossible_mismatch_magnitudes_are_refused_at_once() -> None:
     ("arguments", "message"),
     [
         ({"num_envs": 0}, "num_envs: expected a whole number from 1"),
-        ({"num_envs": 2.0}, "num_envs: expected"),
+        ({"num_envs": 2.5}, "num_envs: expected"),
+        ({"num_envs": True}, "num_envs: expected"),
         ({"threads": 0}, "threads: expected a whole number from 1"),
         ({"autoreset_mode": "Later"}, "autoreset_mode: expected one of NextStep, SameStep, Disabled"),
         ({"render_mode": "human"}, "render_mode: expected one of rgb_array"),
@@ -278,7 +279,7 @@ def test_game_arguments_and_actions_are_checked() -> None:
         ({"robot_1": zeros}, "got none for robot_2"),
         ({"robot_1": zeros, "robot_2": zeros, "robot_3": zeros}, "got 'robot_3'"),
         ({"robot_1": zeros, "robot_2": np.zeros(3)}, "action of robot_2: expected an array of shape"),
-        ({"robot_1": zeros, "robot_2": np.full(7, np.nan)}, "of robot 2"),
+        ({"robot_1": zeros, "robot_2": np.full(7, np.nan)}, "of robot_2"),
         (None, "expected a mapping"),
     ]:
         with pytest.raises(faceoff.Error, match=message):

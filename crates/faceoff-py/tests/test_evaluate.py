@@ -3,6 +3,8 @@
 import json
 import os
 import subprocess
+import sys
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -139,3 +141,74 @@ def test_ended_episode_refuses_an_answer() -> None:
         pass
     with pytest.raises(faceoff.OrderError, match="ended"):
         episode.answer(np.zeros(7))
+
+
+# --- workers -----------------------------------------------------------------------------------------------------
+
+SCRIPT = """
+import json, sys
+import faceoff
+{before}
+{policy}
+result = faceoff.evaluate(policy, tasks="defend", episodes=3, seed=5, workers=2)
+print(json.dumps([outcome["steps"] for outcome in result["episodes"]]))
+"""
+POLICIES = {
+    "lambda": "policy = lambda observation: [0.0] * 7",
+    "local class": """
+def make():
+    class Policy:
+        def __call__(self, observation):
+            return [0.0] * 7
+    return Policy()
+policy = make()""",
+    "function that prints": """
+def policy(observation):
+    print("a policy may print")
+    return [0.0] * 7""",
+}
+
+
+@pytest.mark.parametrize("policy", POLICIES.values(), ids=POLICIES)
+@pytest.mark.parametrize("source", ["file", "standard input"])
+def test_workers_play_policies_defined_anywhere(policy: str, source: str, tmp_path: Path) -> None:
+    """The script has no `if __name__ == "__main__"`."""
+    script = SCRIPT.format(before="", policy=policy)
+    file = tmp_path / "script.py"
+    file.write_text(script)
+    command = [sys.executable, *([file] if source == "file" else ["-"])]
+    done = subprocess.run(command, input=script, capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    expected = faceoff.evaluate(lambda observation: np.zeros(7), tasks="defend", episodes=3, seed=5)
+    assert json.loads(done.stdout) == [outcome["steps"] for outcome in expected["episodes"]]
+
+
+def test_without_cloudpickle_the_error_says_what_to_do(tmp_path: Path) -> None:
+    script = SCRIPT.format(before="sys.modules['cloudpickle'] = None", policy=POLICIES["lambda"])
+    done = subprocess.run([sys.executable, "-"], input=script, capture_output=True, text=True, cwd=tmp_path)
+    assert "faceoff.errors.ArgumentTypeError: policy: expected one" in done.stderr
+    assert "pip install cloudpickle" in done.stderr
+    assert "workers=1" in done.stderr
+
+
+def test_exception_of_a_policy_in_a_worker_is_raised() -> None:
+    def policy(observation: np.ndarray) -> np.ndarray:
+        raise LookupError("no such thing")
+
+    with pytest.raises(LookupError, match="no such thing") as raised:
+        faceoff.evaluate(policy, tasks="defend", episodes=2, workers=2)
+    assert "in policy" in str(raised.value.__cause__)
+
+
+def test_death_of_a_worker_is_told() -> None:
+    def policy(observation: np.ndarray) -> np.ndarray:
+        os._exit(7)
+
+    with pytest.raises(faceoff.Error, match="workers: expected a result .* ended with status 7"):
+        faceoff.evaluate(policy, tasks="defend", episodes=2, workers=2)
+
+
+def test_policy_that_cannot_be_sent_is_refused() -> None:
+    lock = threading.Lock()
+    with pytest.raises(faceoff.ArgumentTypeError, match="policy: expected one that can be sent to other processes"):
+        faceoff.evaluate(lambda observation: lock, tasks="defend", episodes=2, workers=2)

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import supersuit
 from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import RecordEpisodeStatistics
 from commands import runaway_action
@@ -176,3 +177,32 @@ def test_random_side_is_drawn_per_game() -> None:
     env = SelfPlayEnv([hold], side="random")
     sides = {env.reset(seed=0 if game == 0 else None)[1]["side"] for game in range(12)}
     assert sides == set(AGENTS)
+
+
+# --- SuperSuit ---------------------------------------------------------------------------------------------------
+
+
+def test_supersuit_makes_a_vector_environment_of_both_robots() -> None:
+    envs = supersuit.pettingzoo_env_to_vec_env_v1(AirHockeyGame(max_steps=20))
+    observations, _ = envs.reset(seed=3)
+    assert observations.shape == (2, 23)
+    for _ in range(50):
+        observations, rewards, terminated, truncated, _ = envs.step(np.zeros((2, 7), np.float32))
+        assert observations.shape == (2, 23)
+        assert truncated[0] == truncated[1]
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_supersuit_joins_games_in_processes(processes: int) -> None:
+    envs = supersuit.pettingzoo_env_to_vec_env_v1(AirHockeyGame(max_steps=20))
+    envs = supersuit.concat_vec_envs_v1(envs, 4, num_cpus=processes, base_class="gymnasium")
+    observations, _ = envs.reset(seed=3)
+    assert observations.shape == (8, 23)
+    ends = 0
+    for _ in range(30):
+        observations, _, _, truncated, _ = envs.step(np.zeros((8, 7), np.float32))
+        ends += int(truncated.sum())
+    assert ends == 8
+    # Games of other seeds differ.
+    assert len(np.unique(observations[0::2, 0])) > 1
+    envs.close()

@@ -2,6 +2,8 @@
 
 import copy
 import pickle
+import subprocess
+import sys
 import warnings
 from typing import Any
 
@@ -9,7 +11,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from gymnasium.wrappers import NormalizeObservation, RecordEpisodeStatistics
+from gymnasium.wrappers import NormalizeObservation, RecordEpisodeStatistics, TimeLimit
 
 import faceoff.gym
 from faceoff import _native
@@ -257,8 +259,107 @@ def test_pictures_show_the_table() -> None:
     assert (env.render() != before).any()
 
 
-def test_human_mode_without_display_suggests_rgb_array(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_human_mode_without_display_warns_and_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("DISPLAY", raising=False)
     env = AirHockeyEnv("hit", render_mode="human")
-    with pytest.raises(faceoff.Error, match="rgb_array"):
+    with pytest.warns(RuntimeWarning, match="rgb_array"):
         env.reset(seed=0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        env.step(np.zeros(7))
+    env.close()
+
+
+@pytest.mark.parametrize("task", ["hit", "defend", "prepare"])
+def test_checks_of_all_render_modes_pass_without_display(task: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+    env = gymnasium.make(f"faceoff/AirHockey-{task.capitalize()}-v0")
+    with pytest.warns(RuntimeWarning, match="needs"):
+        check_env(env.unwrapped)
+
+
+# --- arguments of gymnasium.make ---------------------------------------------------------------------------------
+
+
+def played_to_the_end(env: Any, **reset: Any) -> tuple[int, dict[str, Any]]:
+    env.reset(**reset)
+    for steps in range(1, 1_000):
+        *_, terminated, truncated, info = env.step(np.zeros(7, np.float32))
+        if terminated or truncated:
+            return steps, info
+    raise AssertionError("the episode does not end")
+
+
+def test_time_limit_of_make_ends_episodes_with_their_outcome() -> None:
+    limited = gymnasium.make("faceoff/AirHockey-Prepare-v0", max_episode_steps=30, profile="evaluation")
+    own = AirHockeyEnv("prepare", max_episode_steps=30, profile="evaluation")
+    for episode in range(3):
+        seed = {"seed": 5} if episode == 0 else {}
+        steps, info = played_to_the_end(limited, **seed)
+        own_steps, own_info = played_to_the_end(own, **seed)
+        assert (steps, info["end"], info["success"]) == (own_steps, own_info["end"], own_info["success"])
+        assert info["steps"] == 30
+    assert limited.unwrapped.save().episode_number == 2
+
+
+def test_time_limit_added_later_keeps_the_seed() -> None:
+    env = AirHockeyEnv("prepare")
+    env.reset(seed=5)
+    steps, info = played_to_the_end(TimeLimit(env, 10))
+    assert (steps, info["end"]) == (10, "horizon")
+    assert env.reset()[1] == {"seed": 5, "episode_number": 2}
+
+
+@pytest.mark.parametrize("steps", [501, 100_000])
+def test_time_limit_out_of_range_is_refused(steps: int) -> None:
+    message = f"max_episode_steps: expected a whole number from 1 to 500, got {steps}"
+    with pytest.raises(faceoff.ArgumentError, match=message):
+        gymnasium.make("faceoff/AirHockey-Defend-v0", max_episode_steps=steps).reset(seed=0)
+    with pytest.raises(faceoff.ArgumentError, match=message):
+        gymnasium.make_vec("faceoff/AirHockey-Defend-v0", num_envs=2, max_episode_steps=steps)
+
+
+def test_make_imports_the_module_of_its_id() -> None:
+    """In a process that has not imported `faceoff.gym`, such as a worker that is spawned."""
+    program = (
+        "import gymnasium, sys; env = gymnasium.make('faceoff.gym:faceoff/AirHockey-Defend-v0');"
+        "print(env.reset(seed=1)[1], 'faceoff.gym' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True)
+    assert done.stdout == "{'seed': 1, 'episode_number': 0} True\n"
+
+
+@pytest.mark.parametrize("context", ["fork", "forkserver", "spawn"])
+def test_workers_of_every_start_method_make_the_environment(context: str) -> None:
+    ident = "faceoff.gym:faceoff/AirHockey-Defend-v0"
+    envs = gymnasium.make_vec(ident, num_envs=2, vectorization_mode="async", vector_kwargs={"context": context})
+    observations, _ = envs.reset(seed=3)
+    alone, _ = AirHockeyEnv("defend").reset(seed=4)
+    np.testing.assert_array_equal(observations[1], alone)
+    envs.close()
+
+
+def test_spec_makes_the_same_environment() -> None:
+    env = gymnasium.make("faceoff/AirHockey-Prepare-v0", max_episode_steps=30, profile="evaluation")
+    assert env.spec is not None
+    twin = gymnasium.make(gymnasium.envs.registration.EnvSpec.from_json(env.spec.to_json()))
+    first, other = played_to_the_end(env, seed=2), played_to_the_end(twin, seed=2)
+    assert (first[0], first[1]["end"]) == (other[0], other[1]["end"]) == (30, "horizon")
+
+
+def test_arguments_of_other_number_types_are_accepted() -> None:
+    reference = AirHockeyEnv("defend", max_episode_steps=100, interpolation=3, mismatch_seed=7)
+    loose = AirHockeyEnv(
+        "defend",
+        max_episode_steps=np.float32(100),  # type: ignore[arg-type]
+        interpolation=np.array(3),  # type: ignore[arg-type]
+        mismatch_seed=np.uint64(7),  # type: ignore[arg-type]
+        clip_actions=np.True_,  # type: ignore[arg-type]
+        perturbations={"tracking_loss": {"probability": np.float32(0.0)}},
+    )
+    expected, _ = reference.reset(seed=3)
+    observation, _ = loose.reset(seed=3.0)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(observation, expected)
+    np.testing.assert_array_equal(
+        loose.step(np.zeros(14, np.int8))[0], reference.step([0.0] * 14)[0]
+    )

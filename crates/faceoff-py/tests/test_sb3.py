@@ -69,6 +69,23 @@ def test_attributes_and_methods_of_worlds() -> None:
             call()
 
 
+def test_recorders_find_the_speed_of_videos() -> None:
+    assert make_worlds(1).metadata["render_fps"] == 50
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"n_envs": 0}, "n_envs: expected a whole number from 1"),
+        ({"profil": "ideal"}, "make_vec_env: expected arguments among .*, got profil"),
+        ({"num_envs": 3}, "make_vec_env: expected arguments among .*, got num_envs"),
+    ],
+)
+def test_errors_name_the_argument_of_the_caller(arguments: dict[str, int], message: str) -> None:
+    with pytest.raises(faceoff.Error, match=message):
+        make_vec_env(**arguments)  # type: ignore[arg-type]
+
+
 def test_other_autoreset_modes_are_refused() -> None:
     with pytest.raises(faceoff.ArgumentTypeError, match="SameStep"):
         VecEnvMethods(AirHockeyVectorEnv(2))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import math
+import operator
 from collections.abc import Iterable, Mapping
 from typing import Any, Literal
 
@@ -42,14 +43,62 @@ def one_of(name: str, value: object, choices: Iterable[str]) -> str:
 
 
 def integer(name: str, value: object, lowest: int, highest: int) -> int:
-    """``value`` as an int from ``lowest`` to ``highest``, both included; a bool is refused."""
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
+    """``value`` as an int from ``lowest`` to ``highest``, both included.
+
+    Integers of other libraries are accepted, and floats without a fraction, as configuration files and hyperparameter
+    searches hand over; a bool is refused.
+    """
+    number = _whole_number(value)
+    if number is None:
         raise ArgumentTypeError(
-            f"{name}: expected a whole number from {lowest} to {highest}, got {value!r}"
+            f"{name}: expected a whole number from {lowest} to {highest}, got {value!r:.80}"
         )
-    if not lowest <= value <= highest:
-        raise ArgumentError(f"{name}: expected a whole number from {lowest} to {highest}, got {value}")
-    return int(value)
+    if not lowest <= number <= highest:
+        raise ArgumentError(f"{name}: expected a whole number from {lowest} to {highest}, got {number}")
+    return number
+
+
+def _whole_number(value: object) -> int | None:
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value.item()
+    if isinstance(value, (bool, np.bool_)):
+        return None
+    if isinstance(value, (float, np.floating)):
+        return int(value) if float(value).is_integer() else None
+    try:
+        return operator.index(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, RuntimeError):  # the last two from tensors
+        return None
+
+
+def flag(name: str, value: object) -> bool:
+    """``value`` as a bool: one of Python or NumPy, or 0 or 1. Other values have a truth value that surprises."""
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value.item()
+    if isinstance(value, (bool, np.bool_)) or (isinstance(value, (int, np.integer)) and value in (0, 1)):
+        return bool(value)
+    raise ArgumentTypeError(f"{name}: expected True or False, got {value!r:.80}")
+
+
+def real(name: str, value: object, above: float, highest: float) -> float:
+    """``value`` as a float above ``above`` and up to ``highest``."""
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, RuntimeError):
+        number = math.nan
+    if isinstance(value, (str, bytes, bool, np.bool_)) or math.isnan(number):
+        raise ArgumentTypeError(f"{name}: expected a number above {above:g} and up to {highest:g}, got {value!r:.80}")
+    if not above < number <= highest:
+        raise ArgumentError(f"{name}: expected a number above {above:g} and up to {highest:g}, got {number:g}")
+    return number
+
+
+def known_names(function: str, given: Iterable[str], known: Iterable[str]) -> None:
+    """Refuses the first name of ``given`` that is not an argument of ``function``."""
+    names = list(known)
+    for name in given:
+        if name not in names:
+            raise ArgumentTypeError(f"{function}: expected arguments among {', '.join(names)}, got {name}")
 
 
 def seed_number(name: str, value: object) -> int:
@@ -61,7 +110,8 @@ def numbers(name: str, value: object, shape: tuple[int, ...]) -> npt.NDArray[np.
     """``value`` as a contiguous float64 array of this shape; NaN and infinity are not refused here."""
     try:
         array = np.asarray(value)
-    except ValueError as error:
+    except (ValueError, TypeError, RuntimeError) as error:
+        # Ragged lists, and tensors on another device or with gradients.
         raise ArgumentError(f"{name}: expected an array of shape {shape}, got {error}") from None
     if array.dtype.kind not in "fiu":
         raise ArgumentTypeError(f"{name}: expected real numbers, got {array.dtype} ({value!r:.80})")
@@ -111,7 +161,22 @@ def perturbations_json(perturbations: object) -> Any:
             f"perturbations: expected a mapping like {{'tracking_loss': {{'probability': 0.0}}}}, "
             f"got {perturbations!r:.80}"
         )
-    return dict(perturbations)
+    return _json_value("perturbations", perturbations)
+
+
+def _json_value(place: str, value: object) -> Any:
+    """``value`` with numbers and arrays of NumPy as those of Python."""
+    if isinstance(value, (np.generic, np.ndarray)):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {str(name): _json_value(f"{place}[{name!r}]", member) for name, member in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_json_value(f"{place}[{index}]", member) for index, member in enumerate(value)]
+    if value is None or isinstance(value, (str, bool, int)):
+        return value
+    if isinstance(value, float) and math.isfinite(value):
+        return value
+    raise ArgumentError(f"{place}: expected finite numbers in mappings, got {value!r:.80}")
 
 
 def mismatch_seed_text(value: object) -> str | None:
@@ -148,16 +213,13 @@ def write_setup(
         "task": one_of("task", task, TASKS),
         "interpolation": interpolation_code(interpolation),
         "action_mode": one_of("action_mode", action_mode, ACTION_MODES),
-        "clip_actions": bool(clip_actions),
+        "clip_actions": flag("clip_actions", clip_actions),
         "factors": factor_names(profile),
         "perturbations": perturbations_json(perturbations),
         "mismatch_seed": mismatch_seed_text(mismatch_seed),
         "max_episode_steps": integer("max_episode_steps", horizon, 1, steps),
     }
-    try:
-        return json.dumps(setup, allow_nan=False)
-    except (TypeError, ValueError) as error:
-        raise ArgumentError(f"perturbations: expected finite numbers in mappings, got {error}") from None
+    return json.dumps(setup, allow_nan=False)
 
 
 def action_len(interpolation: int | None) -> int:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
@@ -18,6 +16,7 @@ from faceoff._arguments import (
     PROFILES,
     TASKS,
     ActionMode,
+    flag,
     integer,
     interpolation_code,
     mismatch_seed_text,
@@ -26,6 +25,7 @@ from faceoff._arguments import (
     perturbations_json,
     seed_text,
 )
+from faceoff._workers import pickled, run_in_workers
 from faceoff.errors import ArgumentError, ArgumentTypeError
 
 #: From an observation, (20,) or (23,) float64 as the protocol has it, to an action.
@@ -62,8 +62,8 @@ def evaluate(
         interpolation, action_mode, clip_actions: as for the environments; ``raw`` actions are those that an agent
             sends. The action may have any shape with the right count of numbers, such as (2, 7).
         perturbations: magnitudes that replace those of the ruleset.
-        workers: number of processes, started by spawning, so the policy must be picklable. Results do not depend on
-            it.
+        workers: number of processes, each with a copy of the policy, which may be defined anywhere. Results do not
+            depend on it.
 
     Returns:
         The content of ``results.json`` as ``faceoff eval`` writes it, with None for computation times, which are not
@@ -83,27 +83,22 @@ def evaluate(
         profile=one_of("profile", profile, PROFILES),
         seed=seed_text("seed", seed),
         mismatch_seed=mismatch_seed_text(mismatch_seed),
-        perturbations=_perturbations_text(perturbations),
+        perturbations=json.dumps(perturbations_json(perturbations)),
         interpolation=interpolation_code(interpolation),
         action_mode=one_of("action_mode", action_mode, ACTION_MODES),
-        clip_actions=bool(clip_actions),
+        clip_actions=flag("clip_actions", clip_actions),
     )
     processes = integer("workers", workers, 1, 256)
     evaluation = setup.evaluation()
-    jobs = [(task, range(first, count, processes)) for task in selected for first in range(processes)]
     outcomes: list[str] = []
     if processes == 1:
-        for task, indices in jobs:
-            outcomes += _run_episodes(evaluation, setup, policies[task], task, indices)
+        for task in selected:
+            outcomes += _run_episodes(evaluation, setup, policies[task], task, range(count))
     else:
-        with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-            futures = [
-                pool.submit(_run_in_process, setup, policies[task], task, indices)
-                for task, indices in jobs
-                if len(indices) > 0
-            ]
-            for future in futures:
-                outcomes += future.result()
+        # A policy of all tasks is sent once, so that it remains one object.
+        value = pickled("policy", policies)
+        parts = [[(task, range(first, count, processes)) for task in selected] for first in range(processes)]
+        outcomes += run_in_workers(_run_in_process, [(value, (setup, part)) for part in parts if len(part[0][1]) > 0])
     result: dict[str, Any] = json.loads(evaluation.score(outcomes))
     for task_result in result["tasks"].values():
         task_result["computation_time_s"] = None
@@ -155,15 +150,13 @@ def _policies(policy: object, tasks: Iterable[str]) -> dict[str, Policy]:
     return dict(by_task)
 
 
-def _perturbations_text(perturbations: object) -> str:
-    try:
-        return json.dumps(perturbations_json(perturbations), allow_nan=False)
-    except (TypeError, ValueError) as error:
-        raise ArgumentError(f"perturbations: expected finite numbers in mappings, got {error}") from None
-
-
-def _run_in_process(setup: _Setup, policy: Policy, task: str, episodes: range) -> list[str]:
-    return _run_episodes(setup.evaluation(), setup, policy, task, episodes)
+def _run_in_process(policies: Mapping[str, Policy], setup: _Setup, part: Sequence[tuple[str, range]]) -> list[str]:
+    evaluation = setup.evaluation()
+    return [
+        outcome
+        for task, episodes in part
+        for outcome in _run_episodes(evaluation, setup, policies[task], task, episodes)
+    ]
 
 
 def _run_episodes(

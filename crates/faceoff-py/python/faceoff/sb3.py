@@ -13,14 +13,16 @@ Stable-Baselines3 needs torch and is only imported by that call.
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from faceoff._arguments import integer, known_names
 from faceoff.errors import ArgumentError, ArgumentTypeError, MissingError
-from faceoff.gym.vector import AirHockeyVectorEnv
+from faceoff.gym.vector import AirHockeyVectorEnv, read_seeds
 
 #: Result of a step in Stable-Baselines3: observations, rewards, dones, and the infos of each world.
 Step = tuple[npt.NDArray[np.float32], npt.NDArray[np.float32], npt.NDArray[np.bool_], list[dict[str, Any]]]
@@ -49,6 +51,8 @@ class VecEnvMethods:
         self.render_mode = envs.render_mode
         # The constructor of Stable-Baselines3's class reads attributes, so they are set first.
         self._init_spaces(envs)
+        # Recorders read the speed of their videos from it.
+        self.metadata = dict(envs.metadata)
         self.reset_infos = [{} for _ in range(self.num_envs)]
         self._seeds = [None] * self.num_envs
 
@@ -60,7 +64,7 @@ class VecEnvMethods:
         """Sets the seeds of the next reset: s, s + 1, …; s is random if left out."""
         if seed is None:
             seed = int(np.random.default_rng().integers(2**32))
-        self._seeds = list(self.envs._read_seeds(seed))
+        self._seeds = read_seeds(seed, self.num_envs, "worlds")
         return list(self._seeds)
 
     def reset(self) -> npt.NDArray[np.float32]:
@@ -164,6 +168,10 @@ def make_vec_env(task: str = "defend", n_envs: int = 1, *, seed: int | None = No
     """
     if "autoreset_mode" in env_arguments:
         raise ArgumentError("autoreset_mode: expected no value, since Stable-Baselines3 has a single mode, got one")
+    count = integer("n_envs", n_envs, 1, 1_000_000)
+    own = ("num_envs", "task", "autoreset_mode")
+    known = [name for name in inspect.signature(AirHockeyVectorEnv).parameters if name not in own]
+    known_names("make_vec_env", env_arguments, known)
     try:
         from stable_baselines3.common.vec_env import VecEnv
     except ImportError as error:
@@ -175,7 +183,7 @@ def make_vec_env(task: str = "defend", n_envs: int = 1, *, seed: int | None = No
         def _init_spaces(self, envs: AirHockeyVectorEnv) -> None:
             VecEnv.__init__(self, envs.num_envs, envs.single_observation_space, envs.single_action_space)
 
-    env = FaceoffVecEnv(AirHockeyVectorEnv(n_envs, task, autoreset_mode="SameStep", **env_arguments))  # type: ignore[arg-type]
+    env = FaceoffVecEnv(AirHockeyVectorEnv(count, task, autoreset_mode="SameStep", **env_arguments))  # type: ignore[arg-type]
     if seed is not None:
         env.seed(seed)
     return env

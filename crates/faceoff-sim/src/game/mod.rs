@@ -51,6 +51,19 @@ pub struct Game {
     violations: [ViolatedGroups; 2],
 }
 
+/// What a rally inherits from the game before it. With the game's setup it determines the start of the rally.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct GameProgress {
+    /// Number of the rally, from 0.
+    pub rally: u32,
+    /// Control steps of the game before the rally.
+    pub steps: u32,
+    /// Goals and fouls before the rally, and who serves.
+    pub referee: Referee,
+    /// Constraints that each robot violated in the current window before the rally.
+    pub violations: [ViolatedGroups; 2],
+}
+
 /// State that is created for each rally.
 #[derive(Debug, Clone)]
 struct Rally {
@@ -94,6 +107,34 @@ impl Game {
             rally,
             steps: 0,
             violations: [ViolatedGroups::default(); 2],
+        }
+    }
+
+    /// A game at the start of a later rally, see [`Self::progress`].
+    #[must_use]
+    pub fn at_rally(setup: GameSetup, progress: &GameProgress) -> Self {
+        let bounds = Bounds::of(AirHockeyRuleset::CURRENT);
+        let serving_robot = progress.referee.serving_robot;
+        let rally = Rally::new(&setup, bounds, progress.rally, serving_robot);
+        Self {
+            setup,
+            bounds,
+            referee: progress.referee.clone(),
+            rally,
+            steps: progress.steps,
+            violations: progress.violations,
+        }
+    }
+
+    /// The progress of the game, from which [`Self::at_rally`] makes the same game. Call it at the start of a rally: it contains nothing
+    /// of what has happened in the rally.
+    #[must_use]
+    pub fn progress(&self) -> GameProgress {
+        GameProgress {
+            rally: self.rally.number,
+            steps: self.steps,
+            referee: self.referee.clone(),
+            violations: self.violations,
         }
     }
 

@@ -282,3 +282,20 @@ fn restarted_agent_may_change_its_interpolation() {
     changed.step([Command::Act(&hold), Command::Act(&hold[..7])]);
     assert_eq!(changed.world().joints(0), changed.world().joints(1));
 }
+
+#[test]
+fn game_continued_from_its_progress_has_the_same_bits() {
+    let hold = hold();
+    let mut game = Game::new(setup(Factors::EVALUATION, 5));
+    while game.rally() < 2 {
+        game.step([Command::Act(&hold); 2]);
+    }
+    let mut later = Game::at_rally(setup(Factors::EVALUATION, 5), &game.progress());
+    assert_eq!(later.progress(), game.progress());
+    while game.rally() < 4 {
+        assert_eq!(later.observation(1), game.observation(1));
+        let step = game.step([Command::Act(&hold); 2]);
+        assert_eq!(later.step([Command::Act(&hold); 2]), step);
+    }
+    assert!(game.steps() > 2 * WINDOW_STEPS);
+}

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
 import numpy.typing as npt
+from gymnasium.wrappers import TimeLimit
 
 from faceoff import _native
 from faceoff._arguments import ActionMode, Task, integer, numbers, one_of, seed_number, write_setup
@@ -64,16 +66,17 @@ class AirHockeyEnv(gymnasium.Env[Any, Any]):
         reward: Reward | None = None,
         render_mode: str | None = None,
     ) -> None:
-        self._setup = write_setup(
-            task=task,
-            interpolation=interpolation,
-            action_mode=action_mode,
-            clip_actions=clip_actions,
-            profile=profile,
-            perturbations=perturbations,
-            mismatch_seed=mismatch_seed,
-            max_episode_steps=max_episode_steps,
-        )
+        self._arguments: dict[str, Any] = {
+            "task": task,
+            "interpolation": interpolation,
+            "action_mode": action_mode,
+            "clip_actions": clip_actions,
+            "profile": profile,
+            "perturbations": perturbations,
+            "mismatch_seed": mismatch_seed,
+            "max_episode_steps": max_episode_steps,
+        }
+        self._setup = write_setup(**self._arguments)
         if render_mode is not None:
             one_of("render_mode", render_mode, self.metadata["render_modes"])
         if reward is not None and not callable(reward):
@@ -107,8 +110,11 @@ class AirHockeyEnv(gymnasium.Env[Any, Any]):
         """Begins an episode. Returns its first observation, and info with ``seed`` and ``episode_number``."""
         worlds = self._require_worlds()
         if seed is not None:
-            seed_number("seed", seed)
+            seed = seed_number("seed", seed)
         number, puck = read_options(options)
+        limit = time_limit_of(self)
+        if limit is not None:
+            worlds, seed, number = self._limited(limit, seed, number)
         super().reset(seed=seed)
         if seed is None and not self._is_started:
             seed = int(self.np_random.integers(2**63))
@@ -117,6 +123,24 @@ class AirHockeyEnv(gymnasium.Env[Any, Any]):
         self._is_started = True
         self._render_human()
         return self._rows.observations[0].copy(), self._origin()
+
+    def _limited(
+        self, steps: int, seed: int | None, number: int | None
+    ) -> tuple[_native.Worlds, int | None, int | None]:
+        """Worlds whose episodes have at most this many steps; and the seed and number of the next episode."""
+        worlds = self._require_worlds()
+        own = self._arguments["max_episode_steps"]
+        setup = write_setup(**self._arguments | {"max_episode_steps": steps if own is None else min(steps, int(own))})
+        if setup == self._setup:
+            return worlds, seed, number
+        if seed is None and self._is_started:
+            # New worlds do not know which episode was the last one.
+            [(seed, last)] = worlds.origins()
+            number = last + 1 if number is None else number
+        worlds.close()
+        self._setup = setup
+        self._worlds = _native.Worlds(setup, 1, 1, "disabled")
+        return self._worlds, seed, number
 
     @exclusive
     def step(
@@ -229,6 +253,22 @@ class AirHockeyEnv(gymnasium.Env[Any, Any]):
         self._rows = self._new_rows()
         if saved is not None:
             self.restore(saved)
+
+
+def time_limit_of(env: AirHockeyEnv) -> int | None:
+    """The number of steps of Gymnasium's ``TimeLimit`` around this environment, whose ``reset`` is under way.
+
+    ``gymnasium.make(max_episode_steps=…)`` does not hand its argument to the environment, but wraps it. The environment must
+    know the limit, because the last step's info says how the episode ended. A wrapper around it is a caller of this call.
+    """
+    limits = []
+    frame = sys._getframe(1)
+    while frame is not None:
+        wrapper = frame.f_locals.get("self") if frame.f_code.co_name == "reset" else None
+        if isinstance(wrapper, TimeLimit) and wrapper.unwrapped is env:
+            limits.append(integer("max_episode_steps", wrapper._max_episode_steps, 1, _native.EPISODE_STEPS))
+        frame = frame.f_back  # type: ignore[assignment]
+    return min(limits) if limits else None
 
 
 def read_options(options: Mapping[str, Any] | None) -> tuple[int | None, list[float] | None]:

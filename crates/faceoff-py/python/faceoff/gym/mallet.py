@@ -10,7 +10,7 @@ from gymnasium.spaces import Box
 from gymnasium.vector import VectorEnv, VectorWrapper
 from gymnasium.vector.utils import batch_space
 
-from faceoff._arguments import numbers
+from faceoff._arguments import numbers, real
 from faceoff.errors import ArgumentError
 from faceoff.kinematics import native
 from faceoff.kinematics.arrays import Floats
@@ -23,6 +23,10 @@ else:
     VectorWrapperBase = VectorWrapper
 
 
+#: The largest mallet speed of an action of 1.
+MAX_SPEED_M_S = 5.0
+
+
 def _check_env(space: gymnasium.Space[Any], action_mode: str) -> None:
     length = space.shape[-1]  # type: ignore[index]
     if action_mode != "raw" or length != 14:
@@ -30,12 +34,6 @@ def _check_env(space: gymnasium.Space[Any], action_mode: str) -> None:
             "env: expected one made with action_mode='raw' and interpolation=3, whose actions are positions and "
             f"velocities, got one with {action_mode!r} and actions of {length} numbers"
         )
-
-
-def _check_speed(value: float) -> float:
-    if not 0.0 < value <= 5.0:
-        raise ArgumentError(f"max_speed_m_s: expected a speed above 0 and up to 5, got {value}")
-    return float(value)
 
 
 class MalletPlane(gymnasium.ActionWrapper[Any, Any, Any]):
@@ -50,7 +48,7 @@ class MalletPlane(gymnasium.ActionWrapper[Any, Any, Any]):
     def __init__(self, env: gymnasium.Env[Any, Any], max_speed_m_s: float = 1.0) -> None:
         super().__init__(env)
         _check_env(env.action_space, getattr(env.unwrapped, "action_mode", "none"))
-        self.motion = MalletMotion(1, _check_speed(max_speed_m_s), native.inverse)
+        self.motion = MalletMotion(1, real("max_speed_m_s", max_speed_m_s, 0.0, MAX_SPEED_M_S), native.inverse)
         self.action_space = Box(-1.0, 1.0, (2,), np.float32)
 
     def reset(
@@ -76,7 +74,7 @@ class MalletPlaneVector(VectorWrapperBase):
     def __init__(self, env: VectorEnv[Any, Any, Any], max_speed_m_s: float = 1.0) -> None:
         super().__init__(env)
         _check_env(env.action_space, getattr(env.unwrapped, "action_mode", "none"))
-        self.motion = MalletMotion(env.num_envs, _check_speed(max_speed_m_s), native.inverse)
+        self.motion = MalletMotion(env.num_envs, real("max_speed_m_s", max_speed_m_s, 0.0, MAX_SPEED_M_S), native.inverse)
         self.single_action_space = Box(-1.0, 1.0, (2,), np.float32)
         self.action_space = batch_space(self.single_action_space, env.num_envs)
         self._ended = np.zeros(env.num_envs, np.bool_)

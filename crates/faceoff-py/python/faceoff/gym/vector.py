@@ -13,7 +13,7 @@ from gymnasium.vector import VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from faceoff import _native
-from faceoff._arguments import ActionMode, Task, integer, mask, numbers, one_of, seed_number, write_setup
+from faceoff._arguments import ActionMode, Task, flag, integer, mask, numbers, one_of, seed_number, write_setup
 from faceoff.errors import ArgumentError, ArgumentTypeError, ClosedError, OrderError
 from faceoff.gym.call_guard import CallGuard, exclusive
 from faceoff.gym.env import AirHockeyEnv, read_options
@@ -22,7 +22,7 @@ from faceoff.gym.rows import Rows
 from faceoff.gym.spaces import action_space, observation_space
 
 try:
-    from gymnasium.vector import AutoresetMode
+    from gymnasium.vector import AutoresetMode as AutoresetMode
 except ImportError:  # Gymnasium 1.0 has one mode and no name for it.
 
     class AutoresetMode(Enum):  # type: ignore[no-redef]
@@ -99,7 +99,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
         self._threads = integer("threads", threads, 1, 1024)
         self.task = task
         self.action_mode = action_mode
-        self.copy = bool(copy)
+        self.copy = flag("copy", copy)
         self.render_mode = render_mode
         self.metadata = {**AirHockeyEnv.metadata, "render_modes": ["rgb_array"]}
         self.metadata["autoreset_mode"] = self.autoreset_mode
@@ -156,7 +156,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
             is_reset = mask("options['reset_mask']", options["reset_mask"], self.num_envs)
         options.pop("reset_mask", None)
         number, puck = read_options(options)
-        seeds = self._read_seeds(seed)
+        seeds = read_seeds(seed, self.num_envs, "worlds")
         super().reset(seed=seed if isinstance(seed, int) else None)
         if not self._is_started:
             fallback = self.np_random.integers(2**63, size=self.num_envs).tolist()
@@ -166,26 +166,6 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
         origins = np.array(worlds.origins(), np.uint64).astype(np.int64)
         self._seeds = origins[:, 0].copy()
         return self._observations(), self._origins(is_reset, origins[:, 1])
-
-    def _read_seeds(self, seed: object) -> list[int | None]:
-        if seed is None:
-            return [None] * self.num_envs
-        if isinstance(seed, (int, np.integer)) and not isinstance(seed, (bool, np.bool_)):
-            first = seed_number("seed", seed)
-            last = seed_number("seed + num_envs - 1", first + self.num_envs - 1)
-            return list(range(first, last + 1))
-        if isinstance(seed, (str, bytes)) or not isinstance(seed, (Sequence, np.ndarray)):
-            raise ArgumentTypeError(
-                f"seed: expected a whole number, or one for each of {self.num_envs} worlds, got {seed!r:.80}"
-            )
-        if len(seed) != self.num_envs:
-            raise ArgumentError(
-                f"seed: expected one for each of {self.num_envs} worlds, got {len(seed)}"
-            )
-        return [
-            None if value is None else seed_number(f"seed[{index}]", value)
-            for index, value in enumerate(seed)
-        ]
 
     def _origins(self, is_reset: Bools, episode_numbers: npt.NDArray[np.int64]) -> dict[str, Any]:
         return {
@@ -408,3 +388,18 @@ def available_cpus() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def read_seeds(seed: object, count: int, things: str) -> list[int | None]:
+    """``seed`` as one seed per world or game: s as s, s + 1, …; None as no seeds; else a sequence, elements may be None."""
+    if seed is None:
+        return [None] * count
+    if isinstance(seed, (int, np.integer)) and not isinstance(seed, (bool, np.bool_)):
+        first = seed_number("seed", seed)
+        last = seed_number(f"seed + {count - 1}, the last of {count} {things}", first + count - 1)
+        return list(range(first, last + 1))
+    if isinstance(seed, (str, bytes)) or not isinstance(seed, (Sequence, np.ndarray)):
+        raise ArgumentTypeError(f"seed: expected a whole number, or one for each of {count} {things}, got {seed!r:.80}")
+    if len(seed) != count:
+        raise ArgumentError(f"seed: expected one for each of {count} {things}, got {len(seed)}")
+    return [None if value is None else seed_number(f"seed[{index}]", value) for index, value in enumerate(seed)]

@@ -3,33 +3,31 @@
 from __future__ import annotations
 
 import time
+import warnings
 
 import numpy as np
 import numpy.typing as npt
-
-from faceoff.errors import MissingError
 
 
 class Window:
     """A tkinter window; tkinter comes with Python or as the system's package python3-tk.
 
-    Raises:
-        MissingError: if tkinter or a display is missing.
+    Without tkinter or a display it shows nothing and warns once, so that checks of an environment, which try all render
+    modes, also work on servers.
     """
 
     def __init__(self, title: str, frames_per_second: int) -> None:
+        self._is_open = False
         try:
             import tkinter
-        except ImportError as error:
-            raise MissingError(
-                "render_mode='human' needs tkinter: install the system's package python3-tk, or use 'rgb_array'"
-            ) from error
-        try:
+
             self._root = tkinter.Tk()
-        except tkinter.TclError as error:
-            raise MissingError(
-                f"render_mode='human' needs a display ({error}): use 'rgb_array' where there is none"
-            ) from error
+        except (ImportError, RuntimeError) as error:
+            _warn("tkinter", f"{error}; install the system's package python3-tk")
+            return
+        except Exception as error:  # tkinter.TclError, whose module may be missing
+            _warn("a display", str(error))
+            return
         self._root.title(title)
         self._label = tkinter.Label(self._root, borderwidth=0)
         self._label.pack()
@@ -58,3 +56,11 @@ class Window:
         if self._is_open:
             self._is_open = False
             self._root.destroy()
+
+
+def _warn(missing: str, reason: str) -> None:
+    warnings.warn(
+        f"render_mode='human' needs {missing} and shows nothing ({reason}): use 'rgb_array' where there is none",
+        RuntimeWarning,
+        stacklevel=4,
+    )

@@ -1,0 +1,127 @@
+"""Processes that run parts of an evaluation.
+
+They are started by a command, not by `multiprocessing`: they do not import the caller's script again, so a script needs no
+``if __name__ == "__main__"``, and a policy may be defined anywhere, also in a notebook. For that it is pickled by value,
+which needs cloudpickle (Gymnasium installs it); without it, the policy must be importable.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+from faceoff.errors import ArgumentTypeError, Error
+
+#: A worker's program. The caller's packages may be where only its path leads, so standard input begins with that.
+PROGRAM = "import pickle, sys; sys.path[:] = pickle.load(sys.stdin.buffer); from faceoff._workers import main; main()"
+
+
+def pickled(name: str, value: object) -> bytes:
+    """``value`` for a worker; ``name`` is the argument's, for the error message."""
+    try:
+        import cloudpickle
+    except ImportError:
+        cloudpickle = None
+    try:
+        if cloudpickle is not None:
+            data: bytes = cloudpickle.dumps(value)
+            return data
+        data = pickle.dumps(value)
+    except Exception as error:
+        hint = "keep open files, locks and loggers out of it" if cloudpickle else "pip install cloudpickle"
+        raise ArgumentTypeError(
+            f"{name}: expected one that can be sent to other processes, got one that cannot ({error}): {hint}, or use "
+            "workers=1"
+        ) from None
+    # A worker has another main module.
+    if b"__main__" in data:
+        raise ArgumentTypeError(
+            f"{name}: expected one defined in a module, got one of the script or session itself, which other processes "
+            "cannot import: pip install cloudpickle, put it in a module, or use workers=1"
+        )
+    return data
+
+
+def run_in_workers(function: Callable[..., list[Any]], jobs: Sequence[tuple[bytes, tuple[Any, ...]]]) -> list[Any]:
+    """Calls ``function(value, *arguments)`` for each job in a process of its own; a job has the pickled value and the arguments.
+
+    Returns the concatenated results in the order of the jobs.
+
+    Raises:
+        Error: a process ended without a result. Exceptions of the function are raised as they are.
+    """
+    if not sys.executable:
+        raise Error("workers: expected an interpreter that can be started, got an embedded one: use workers=1")
+    processes: list[subprocess.Popen[bytes]] = []
+    try:
+        for _ in jobs:
+            processes.append(
+                subprocess.Popen([sys.executable, "-c", PROGRAM], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+            )
+        path = pickle.dumps(sys.path)
+        requests = [path + pickle.dumps((function, value, arguments)) for value, arguments in jobs]
+        with ThreadPoolExecutor(len(jobs)) as threads:
+            # An error of one ends the others, whose results would be thrown away.
+            futures = [threads.submit(_result, *pair) for pair in zip(processes, requests, strict=True)]
+            try:
+                return [outcome for future in futures for outcome in future.result()]
+            finally:
+                _end(processes)
+    finally:
+        _end(processes)
+
+
+def _end(processes: Sequence[subprocess.Popen[bytes]]) -> None:
+    for process in processes:
+        if process.poll() is None:
+            process.kill()
+        process.wait()
+
+
+def _result(process: subprocess.Popen[bytes], request: bytes) -> list[Any]:
+    try:
+        answer, _ = process.communicate(request)
+    except BrokenPipeError:
+        answer = b""
+    if process.returncode != 0 or not answer:
+        raise Error(
+            f"workers: expected a result of each process, but one ended with status {process.returncode}; its last output "
+            "is above; a negative status is a signal, and -9 often means that memory was short: use fewer workers"
+        )
+    kind, content, text = pickle.loads(answer)
+    if kind == "outcomes":
+        outcomes: list[Any] = content
+        return outcomes
+    try:
+        error = pickle.loads(content)
+    except Exception:
+        error = None
+    if not isinstance(error, Exception):
+        raise Error(f"the policy failed in a worker:\n{text}")
+    raise error from Error(f"in a worker:\n{text}")
+
+
+def main() -> None:
+    """Runs the job that standard input contains, and writes its result to standard output."""
+    # Prints of a policy must not get between the result.
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    sys.stdout = sys.stderr
+    try:
+        function, value, arguments = pickle.load(sys.stdin.buffer)
+        result: tuple[str, Any, str] = ("outcomes", function(pickle.loads(value), *arguments), "")
+    except Exception as error:
+        text = "".join(traceback.format_exception(error))
+        try:
+            content = pickle.dumps(error)
+        except Exception:
+            content = b""
+        result = ("error", content, text)
+    answers.write(pickle.dumps(result))
+    answers.close()

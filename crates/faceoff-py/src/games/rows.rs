@@ -1,0 +1,155 @@
+//! Output arrays of the games' steps, a row per game, in memory of Python. The *facts* of a game are 22 numbers about its
+//! last step.
+
+use super::running::RunningGame;
+use crate::{errors::argument_error, observation};
+use faceoff_sim::{
+    Game, GameState, GameStep, JOINTS, RallyEnd, channel::observation::OBSERVATION_WITH_OPPONENT_LEN,
+};
+use numpy::{PyReadwriteArray2, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use rayon::prelude::*;
+
+/// Names of the reasons why a rally ends; their positions are the codes in [`GameRow::write_facts`].
+pub const RALLY_ENDS: [&str; 5] = ["goal", "foul", "stuck", "left_table", "diverged"];
+
+/// Count of numbers in a game's row of facts; see [`GameRow::write_facts`].
+pub const GAME_FACTS: usize = 22;
+
+/// Count of numbers in a true state: the puck's 6 in the table frame; for each robot its joint positions and velocities (7
+/// each), and the end effector's 3 in its own base frame.
+pub const GAME_STATE_LEN: usize = 6 + 2 * (2 * JOINTS + 3);
+
+const OBSERVATIONS_LEN: usize = 2 * OBSERVATION_WITH_OPPONENT_LEN;
+
+/// Arrays with two rows per game, robot 1 first (observations and final observations), or with one (facts, true states).
+#[derive(FromPyObject)]
+pub struct GameRows<'py>(
+    PyReadwriteArray2<'py, f32>,
+    PyReadwriteArray2<'py, f32>,
+    PyReadwriteArray2<'py, f64>,
+    PyReadwriteArray2<'py, f64>,
+);
+
+/// The row of a game.
+pub struct GameRow<'a> {
+    observations: &'a mut [f32],
+    final_observations: &'a mut [f32],
+    facts: &'a mut [f64],
+    state: &'a mut [f64],
+}
+
+impl GameRows<'_> {
+    /// The rows of `games` games.
+    ///
+    /// # Errors
+    /// If an array has another shape or is not contiguous.
+    pub fn rows(&mut self, games: usize) -> PyResult<Vec<GameRow<'_>>> {
+        let Self(observations, finals, facts, states) = self;
+        let check = |name, shape: &[usize], rows, width| {
+            if shape == [rows, width] {
+                return Ok(());
+            }
+            let expected = format!("an array of shape ({rows}, {width})");
+            Err(argument_error(name, expected, format!("one of shape {shape:?}")))
+        };
+        let width = OBSERVATION_WITH_OPPONENT_LEN;
+        check("observations", observations.shape(), 2 * games, width)?;
+        check("final observations", finals.shape(), 2 * games, width)?;
+        check("facts", facts.shape(), games, GAME_FACTS)?;
+        check("states", states.shape(), games, GAME_STATE_LEN)?;
+        let observations = observations.as_slice_mut()?.chunks_exact_mut(OBSERVATIONS_LEN);
+        let finals = finals.as_slice_mut()?.chunks_exact_mut(OBSERVATIONS_LEN);
+        let facts = facts.as_slice_mut()?.chunks_exact_mut(GAME_FACTS);
+        let states = states.as_slice_mut()?.chunks_exact_mut(GAME_STATE_LEN);
+        Ok(observations
+            .zip(finals)
+            .zip(facts.zip(states))
+            .map(|((observations, final_observations), (facts, state))| GameRow {
+                observations,
+                final_observations,
+                facts,
+                state,
+            })
+            .collect())
+    }
+}
+
+impl GameRow<'_> {
+    /// Writes the row of a game that was started or restored.
+    pub fn write_start(&mut self, running: &RunningGame) {
+        write_both(&running.game, self.observations);
+        self.state.copy_from_slice(&flatten(&running.game.state()));
+        self.facts.fill(0.0);
+        self.facts[..2].fill(-1.0);
+        self.write_counts(running, [0; 2]);
+    }
+
+    /// Writes the row of a game after a step that gained these points for each side.
+    pub fn write_step(&mut self, running: &RunningGame, step: &GameStep, points: [u32; 2]) {
+        write_both(&running.game, self.observations);
+        self.state.copy_from_slice(&flatten(&step.state));
+        self.write_facts(running, step, points);
+    }
+
+    /// Writes the observations of a new game; those of the game before it become the final ones.
+    pub fn write_successor(&mut self, next: &RunningGame) {
+        self.final_observations.copy_from_slice(self.observations);
+        write_both(&next.game, self.observations);
+    }
+
+    /// Code of the rally's end in [`RALLY_ENDS`] and the robot that brought it about (−1: none), 2 × 4 constraint values (ee,
+    /// link, joint_pos, joint_vel), whether each robot has made the world diverge, goals, fouls, score, points of the
+    /// step, control steps of the game, and its number.
+    fn write_facts(&mut self, running: &RunningGame, step: &GameStep, points: [u32; 2]) {
+        let (code, by) = match step.rally_end {
+            None => (-1.0, None),
+            Some(RallyEnd::Goal { by }) => (0.0, Some(by)),
+            Some(RallyEnd::Foul { by }) => (1.0, Some(by)),
+            Some(RallyEnd::Stuck) => (2.0, None),
+            Some(RallyEnd::LeftTable) => (3.0, None),
+            Some(RallyEnd::Diverged { .. }) => (4.0, None),
+        };
+        self.facts[0] = code;
+        self.facts[1] = by.map_or(-1.0, |robot| robot as f64);
+        for (values, facts) in step.constraints.iter().zip(self.facts[2..10].chunks_exact_mut(4)) {
+            facts.copy_from_slice(&[values.ee, values.link, values.joint_pos, values.joint_vel]);
+        }
+        let diverged = step.divergence.map_or([false; 2], |divergence| divergence.robots_at_fault);
+        for (fact, has_diverged) in self.facts[10..12].iter_mut().zip(diverged) {
+            *fact = f64::from(u8::from(has_diverged));
+        }
+        self.write_counts(running, points);
+    }
+
+    fn write_counts(&mut self, running: &RunningGame, points: [u32; 2]) {
+        let referee = running.game.referee();
+        let counts = [referee.goals, referee.fouls, referee.score(), points];
+        for (fact, count) in self.facts[12..20].iter_mut().zip(counts.concat()) {
+            *fact = f64::from(count);
+        }
+        self.facts[20] = f64::from(running.game.steps());
+        self.facts[21] = f64::from(running.origin.number);
+    }
+}
+
+/// Writes the observations of both robots, each from its own side.
+fn write_both(game: &Game, out: &mut [f32]) {
+    for (robot, row) in out.chunks_exact_mut(OBSERVATION_WITH_OPPONENT_LEN).enumerate() {
+        observation::write(game.observation(robot), row);
+    }
+}
+
+/// A true state as [`GAME_STATE_LEN`] numbers.
+pub fn flatten(state: &GameState) -> Vec<f64> {
+    let robot = |robot: usize| [&state.q[robot][..], &state.dq[robot], &state.ee[robot]].concat();
+    [&state.puck[..], &robot(0), &robot(1)].concat()
+}
+
+/// Games with their rows, for parallel processing.
+pub fn games_with_rows<'a, 'g, 'r>(
+    games: &'g mut [RunningGame],
+    rows: &'a mut [GameRow<'r>],
+) -> impl IndexedParallelIterator<Item = (&'g mut RunningGame, &'a mut GameRow<'r>)> {
+    games.par_iter_mut().zip(rows.par_iter_mut())
+}

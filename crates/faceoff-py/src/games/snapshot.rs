@@ -1,0 +1,183 @@
+//! Saved states of games.
+
+use super::{
+    running::{GameOrigin, RunningGame},
+    settings::GameSettings,
+};
+use crate::errors::{argument_error, catch_panic};
+use faceoff_sim::{
+    ViolatedGroups,
+    game::{GameProgress, referee::Referee},
+};
+use pyo3::{
+    prelude::*,
+    types::{PyBytes, PyDict},
+};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// The exact state of a game. In memory it is a copy; pickled it is the start of the current rally with the actions since
+/// then, which are simulated again on loading.
+#[pyclass(frozen, module = "faceoff._native")]
+pub struct GameSnapshot {
+    pub settings: Arc<GameSettings>,
+    pub running: RunningGame,
+}
+
+/// What a pickled state contains.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SavedGame {
+    /// The version of the package that wrote it.
+    faceoff: String,
+    settings: GameSettings,
+    seed: u64,
+    number: u32,
+    is_over: bool,
+    rally: u32,
+    steps: u32,
+    goals: [u32; 2],
+    fouls: [u32; 2],
+    serving_robot: usize,
+    /// Of each robot: ee, link, joint_pos, joint_vel.
+    violations: [[bool; 4]; 2],
+    /// `None` is a number of a robot that was not commanded.
+    actions: Vec<Option<f64>>,
+}
+
+#[pymethods]
+impl GameSnapshot {
+    /// The seed of the game.
+    #[getter]
+    fn seed(&self) -> u64 {
+        self.running.origin.seed
+    }
+
+    /// The game's number among those of its seed.
+    #[getter]
+    fn game_number(&self) -> u32 {
+        self.running.origin.number
+    }
+
+    /// Control steps of the game so far.
+    #[getter]
+    fn steps(&self) -> u32 {
+        self.running.game.steps()
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "<state of a game: seed {}, game {}, step {}>",
+            self.running.origin.seed,
+            self.running.origin.number,
+            self.running.game.steps()
+        )
+    }
+
+    // A snapshot is immutable, so a copy is the same object.
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyDict>) -> Py<Self> {
+        slf
+    }
+
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        let running = &self.running;
+        let GameProgress {
+            rally,
+            steps,
+            referee,
+            violations,
+        } = &running.rally_start;
+        let saved = SavedGame {
+            faceoff: env!("CARGO_PKG_VERSION").to_owned(),
+            settings: GameSettings::clone(&self.settings),
+            seed: running.origin.seed,
+            number: running.origin.number,
+            is_over: running.is_over,
+            rally: *rally,
+            steps: *steps,
+            goals: referee.goals,
+            fouls: referee.fouls,
+            serving_robot: referee.serving_robot,
+            violations: violations.map(|v| [v.ee, v.link, v.joint_pos, v.joint_vel]),
+            actions: running
+                .actions
+                .iter()
+                .map(|number| (!number.is_nan()).then_some(*number))
+                .collect(),
+        };
+        let json = serde_json::to_vec(&saved)
+            .map_err(|error| argument_error("state", "a state that can be serialised", error))?;
+        let load = py.import("faceoff._native")?.getattr("load_game")?;
+        Ok((load, (PyBytes::new(py, &json),)))
+    }
+}
+
+/// Loads a pickled state by simulating its rally again.
+#[pyfunction]
+pub fn load_game(py: Python<'_>, data: &[u8]) -> PyResult<GameSnapshot> {
+    let saved: SavedGame = serde_json::from_slice(data)
+        .map_err(|error| argument_error("state", "a game pickled by faceoff", error))?;
+    let own_version = env!("CARGO_PKG_VERSION");
+    if saved.faceoff != own_version {
+        return Err(argument_error(
+            "state",
+            format!(
+                "one pickled by this version of faceoff, {own_version}, which alone plays it again exactly"
+            ),
+            format!(
+                "one of version {}",
+                faceoff_types::escape_unprintable(&saved.faceoff)
+            ),
+        ));
+    }
+    if saved.serving_robot > 1 {
+        return Err(argument_error(
+            "state",
+            "a serving robot of 0 or 1",
+            saved.serving_robot,
+        ));
+    }
+    let settings = serde_json::to_string(&saved.settings)
+        .map_err(|error| argument_error("state", "valid settings", error))?;
+    let settings = GameSettings::read(&settings)?;
+    let origin = GameOrigin {
+        seed: saved.seed,
+        number: saved.number,
+    };
+    let progress = GameProgress {
+        rally: saved.rally,
+        steps: saved.steps,
+        referee: Referee {
+            goals: saved.goals,
+            fouls: saved.fouls,
+            ..Referee::new(saved.serving_robot)
+        },
+        violations: saved
+            .violations
+            .map(|[ee, link, joint_pos, joint_vel]| ViolatedGroups {
+                ee,
+                link,
+                joint_pos,
+                joint_vel,
+            }),
+    };
+    let actions: Vec<f64> = saved
+        .actions
+        .iter()
+        .map(|number| number.unwrap_or(f64::NAN))
+        .collect();
+    let replay = || RunningGame::replay(&settings, origin, &progress, &actions);
+    let mut running = py.detach(|| catch_panic(replay))?;
+    running.is_over = saved.is_over;
+    Ok(GameSnapshot {
+        settings: Arc::new(settings),
+        running,
+    })
+}
