@@ -2,9 +2,11 @@
 
     python agents/examples/train_ppo.py --out my-training
 
-Trains in the package's vector environment with the perturbations of evaluations, each world (simulated table) with
-another robot, and writes `weights.npz` and `log.txt`. Then it evaluates on the episodes of `faceoff eval --seed 0`,
+Trains in the package's vector environment with the perturbations of evaluations, and writes `weights.npz` and `log.txt`. Then it evaluates on the episodes of `faceoff eval --seed 0`,
 which are not used for training, and compares with an arm that holds still. `make_bundle.py` makes an agent of the weights.
+
+Each world (simulated table) has another robot. The season's robot is known from your first dataset on: train with it
+by `--dataset dataset.zip`.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from pathlib import Path
 # The environment has its own threads; threads of linear algebra on small arrays would only compete with them.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+import faceoff.dataset
 from network import save
 from ppo import Learner, Settings
 from scores import log_scores
@@ -36,6 +39,7 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=STEPS, help=f"control steps to learn from ({STEPS:,})")
     parser.add_argument("--worlds", type=int, default=256, help="worlds stepped together (256)")
     parser.add_argument("--seed", type=int, default=1, help="seed of all random draws (1)")
+    parser.add_argument("--dataset", type=Path, help="a dataset of the season, whose robot to train with")
     parser.add_argument("--episodes", type=int, default=400, help="episodes of the final evaluation (400)")
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
@@ -53,7 +57,8 @@ def main() -> None:
 
 def train(arguments: argparse.Namespace, log_line: Callable[[str], None]) -> int:
     """Trains and saves the weights; returns the number of control steps."""
-    worlds = DefendWorlds(arguments.worlds)
+    mismatch_seed = None if arguments.dataset is None else faceoff.dataset.open(arguments.dataset).mismatch_seed
+    worlds = DefendWorlds(arguments.worlds, mismatch_seed)
     learner = Learner(worlds, Settings(), arguments.seed)
     steps_per_round: int = learner.settings.steps_per_round * arguments.worlds
     rounds: int = -(-arguments.steps // steps_per_round)

@@ -29,12 +29,15 @@ def reward(transition: Transition) -> npt.NDArray[np.float64]:
 
 
 class DefendWorlds:
-    """Episodes of `defend`, profile `evaluation`, each world with another robot; actions are mallet velocities."""
+    """Episodes of `defend`, profile `evaluation`; actions are mallet velocities.
+
+    Each world has another robot, or all have the one of `mismatch_seed`.
+    """
 
     feature_count = FEATURE_COUNT
     actions = 2
 
-    def __init__(self, worlds: int) -> None:
+    def __init__(self, worlds: int, mismatch_seed: str | None = None) -> None:
         self.worlds = worlds
         self._env = AirHockeyVectorEnv(
             worlds,
@@ -42,6 +45,7 @@ class DefendWorlds:
             action_mode="raw",
             interpolation=3,
             profile="evaluation",
+            mismatch_seed=mismatch_seed,
             autoreset_mode="SameStep",
             reward=reward,
         )

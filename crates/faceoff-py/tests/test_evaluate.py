@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import faceoff
+import faceoff.dataset
 from commands import diverging_actions
 from faceoff import _native
 from faceoff.gym import AirHockeyEnv
@@ -133,6 +134,35 @@ def test_binary_gives_the_same_numbers(profile: str, tmp_path: Path) -> None:
             for scored in result["tasks"].values():
                 scored["penalty_points"] = scored["tier"] = None
     assert from_package == from_program
+
+
+def test_dataset_has_the_seed_of_its_robot(tmp_path: Path) -> None:
+    command: list[str | Path] = [BINARY, "eval", ROOT / "agents" / "hold", "--no-sandbox", "--task", "defend"]
+    command += ["--episodes", "4", "--seed", "17", "--mismatch-seed", "9", "--out", tmp_path]
+    subprocess.run(command, check=True, capture_output=True, cwd=tmp_path)
+    dataset = faceoff.dataset.open(tmp_path)
+    actions = [dataset.episode("defend", episode).to_numpy().actions for episode in range(4)]
+
+    class Recorded:
+        def reset(self, task: str, episode: int) -> None:
+            self.actions = iter(actions[episode])
+
+        def __call__(self, observation: np.ndarray) -> np.ndarray:
+            seen.append(observation)
+            return next(self.actions)
+
+    def observations(mismatch_seed: str | None) -> list[np.ndarray]:
+        seen.clear()
+        faceoff.evaluate(
+            Recorded(), tasks="defend", episodes=4, seed=17, mismatch_seed=mismatch_seed, interpolation=3,
+            action_mode="raw",
+        )
+        return list(seen)
+
+    seen: list[np.ndarray] = []
+    recorded = [row for episode in range(4) for row in dataset.episode("defend", episode).to_numpy().observations[:-1]]
+    np.testing.assert_array_equal(observations(dataset.mismatch_seed), recorded)
+    assert not np.array_equal(np.array(observations(None)[:50]), np.array(recorded[:50]))
 
 
 def test_ended_episode_refuses_an_answer() -> None:

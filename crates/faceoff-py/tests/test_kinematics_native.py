@@ -338,17 +338,20 @@ def test_mallet_commands_agree_between_both_inverses() -> None:
     assert np.ptp(native_motion.xy, axis=0).min() > 0.3, "the mallets have moved"
 
 
-def test_package_folder_works_without_the_compiled_half(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["faceoff/kinematics", "arm", "lib/geometry/robot"])
+def test_package_folder_works_under_any_name_without_the_compiled_half(name: str, tmp_path: Path) -> None:
     """The folder is copied alone, as in a bundle."""
-    shutil.copytree(Path(arm.__file__).parent, tmp_path / "faceoff" / "kinematics")
-    (tmp_path / "faceoff" / "__init__.py").touch()
+    shutil.copytree(Path(arm.__file__).parent, tmp_path / name)
+    first = name.split("/")[0]
+    if first != name:
+        (tmp_path / first / "__init__.py").touch()
     program = (
-        "import faceoff.kinematics as arm, sys\n"
+        f"import {name.replace('/', '.')} as arm, sys\n"
         "print(arm.inverse((0.8, 0.1))[1], arm.MalletMotion(1, 1.0).xy.shape, arm.__file__)\n"
-        "print(*(name for name in sys.modules if 'native' in name and 'faceoff' in name))\n"
+        f"print(*(name for name in sys.modules if 'faceoff' in name and not name.startswith('{first}')), sep='')\n"
     )
     done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True)
-    assert done.stdout == f"True (1, 2) {tmp_path / 'faceoff' / 'kinematics' / '__init__.py'}\n\n", done.stderr
+    assert done.stdout == f"True (1, 2) {tmp_path / name / '__init__.py'}\n\n", done.stderr
 
 
 def test_names_equal_those_of_numpy_except_trajectories() -> None:

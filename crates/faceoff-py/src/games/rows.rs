@@ -4,7 +4,8 @@
 use super::running::RunningGame;
 use crate::{errors::argument_error, observation};
 use faceoff_sim::{
-    Game, GameState, GameStep, JOINTS, RallyEnd, channel::observation::OBSERVATION_WITH_OPPONENT_LEN,
+    Game, GameState, GameStep, JOINTS, RallyEnd,
+    channel::observation::OBSERVATION_WITH_OPPONENT_LEN,
 };
 use numpy::{PyReadwriteArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -51,26 +52,34 @@ impl GameRows<'_> {
                 return Ok(());
             }
             let expected = format!("an array of shape ({rows}, {width})");
-            Err(argument_error(name, expected, format!("one of shape {shape:?}")))
+            Err(argument_error(
+                name,
+                expected,
+                format!("one of shape {shape:?}"),
+            ))
         };
         let width = OBSERVATION_WITH_OPPONENT_LEN;
         check("observations", observations.shape(), 2 * games, width)?;
         check("final observations", finals.shape(), 2 * games, width)?;
         check("facts", facts.shape(), games, GAME_FACTS)?;
         check("states", states.shape(), games, GAME_STATE_LEN)?;
-        let observations = observations.as_slice_mut()?.chunks_exact_mut(OBSERVATIONS_LEN);
+        let observations = observations
+            .as_slice_mut()?
+            .chunks_exact_mut(OBSERVATIONS_LEN);
         let finals = finals.as_slice_mut()?.chunks_exact_mut(OBSERVATIONS_LEN);
         let facts = facts.as_slice_mut()?.chunks_exact_mut(GAME_FACTS);
         let states = states.as_slice_mut()?.chunks_exact_mut(GAME_STATE_LEN);
         Ok(observations
             .zip(finals)
             .zip(facts.zip(states))
-            .map(|((observations, final_observations), (facts, state))| GameRow {
-                observations,
-                final_observations,
-                facts,
-                state,
-            })
+            .map(
+                |((observations, final_observations), (facts, state))| GameRow {
+                    observations,
+                    final_observations,
+                    facts,
+                    state,
+                },
+            )
             .collect())
     }
 }
@@ -112,10 +121,16 @@ impl GameRow<'_> {
         };
         self.facts[0] = code;
         self.facts[1] = by.map_or(-1.0, |robot| robot as f64);
-        for (values, facts) in step.constraints.iter().zip(self.facts[2..10].chunks_exact_mut(4)) {
+        for (values, facts) in step
+            .constraints
+            .iter()
+            .zip(self.facts[2..10].chunks_exact_mut(4))
+        {
             facts.copy_from_slice(&[values.ee, values.link, values.joint_pos, values.joint_vel]);
         }
-        let diverged = step.divergence.map_or([false; 2], |divergence| divergence.robots_at_fault);
+        let diverged = step
+            .divergence
+            .map_or([false; 2], |divergence| divergence.robots_at_fault);
         for (fact, has_diverged) in self.facts[10..12].iter_mut().zip(diverged) {
             *fact = f64::from(u8::from(has_diverged));
         }
@@ -135,7 +150,10 @@ impl GameRow<'_> {
 
 /// Writes the observations of both robots, each from its own side.
 fn write_both(game: &Game, out: &mut [f32]) {
-    for (robot, row) in out.chunks_exact_mut(OBSERVATION_WITH_OPPONENT_LEN).enumerate() {
+    for (robot, row) in out
+        .chunks_exact_mut(OBSERVATION_WITH_OPPONENT_LEN)
+        .enumerate()
+    {
         observation::write(game.observation(robot), row);
     }
 }

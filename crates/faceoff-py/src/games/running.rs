@@ -3,9 +3,7 @@
 
 use super::settings::GameSettings;
 use crate::{actions::ActionFormat, errors::argument_error};
-use faceoff_sim::{
-    Command, Game, GameStep, JOINTS, Plant, game::GameProgress, model::INITIAL_Q,
-};
+use faceoff_sim::{Command, Game, GameStep, JOINTS, Plant, game::GameProgress, model::INITIAL_Q};
 use pyo3::prelude::*;
 use std::sync::Arc;
 

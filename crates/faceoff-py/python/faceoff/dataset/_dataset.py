@@ -43,7 +43,7 @@ class Dataset:
         self.path = container.path
         self.manifest = manifest
         """The content of `manifest.json`."""
-        container.check_manifest(manifest, LAYOUTS, agent=str, seed=str, episodes=dict, files=dict)
+        container.check_manifest(manifest, LAYOUTS, agent=str, seed=str, mismatch_seed=str, episodes=dict, files=dict)
 
     @property
     def layout(self) -> str:
@@ -59,6 +59,14 @@ class Dataset:
     def seed(self) -> str:
         """The evaluation's seed, 64 hexadecimal digits."""
         return str(self.manifest["seed"])
+
+    @property
+    def mismatch_seed(self) -> str:
+        """The seed of the robot's deviation from its model, 64 hexadecimal digits; the same in all datasets of a season.
+
+        It is the `mismatch_seed` of the environments, which then have that robot.
+        """
+        return str(self.manifest["mismatch_seed"])
 
     @property
     def profile(self) -> str:

@@ -14,6 +14,7 @@ import pyarrow as pa
 from faceoff.errors import ArgumentError
 
 from ._container import Container
+from ._errors import DatasetError
 from ._episode import CONSTRAINTS, EE, JOINT_POS, JOINT_VEL, OBSERVATION, PUCK, action_shape
 from ._rows import Floats, Rows, floats, lists, seconds, to_polars
 
@@ -148,6 +149,18 @@ class Game:
     def agents(self) -> tuple[str, ...]:
         """The names of both sides' agents."""
         return tuple(str(agent) for agent in self.manifest["agents"])
+
+    @property
+    def mismatch_seed(self) -> str:
+        """The seed of the robots' deviation from their model, 64 hexadecimal digits; see `Dataset.mismatch_seed`.
+
+        Raises:
+            DatasetError: it is not in a team's file of its own side.
+        """
+        seed = self.manifest.get("mismatch_seed")
+        if not isinstance(seed, str):
+            raise DatasetError(f"{self.path}: expected a game with its mismatch_seed, got a file of one side ({self.layout})")
+        return seed
 
     @property
     def sides(self) -> tuple[int, ...]:

@@ -9,9 +9,9 @@ The agent's model has seven joints. The mallet hangs on a universal joint that k
 "the mallet's position" is that of the end effector, the rod's tip.
 """
 
-from faceoff.kinematics.limits import Constraints, constraints, speed_share
-from faceoff.kinematics.mallet import MalletMotion
-from faceoff.kinematics.poses import (
+from .limits import Constraints, constraints, speed_share
+from .mallet import MalletMotion
+from .poses import (
     forward,
     frames,
     heights,
@@ -20,7 +20,7 @@ from faceoff.kinematics.poses import (
     posture_velocities,
     velocities,
 )
-from faceoff.kinematics.trajectory import Trajectory, minimum_jerk, setpoints
+from .trajectory import Trajectory, minimum_jerk, setpoints
 
 __all__ = [
     "Constraints",

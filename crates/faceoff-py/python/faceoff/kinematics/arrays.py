@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from faceoff.kinematics import model, plain
+from . import model, plain
 
 Floats = NDArray[np.float64]
 

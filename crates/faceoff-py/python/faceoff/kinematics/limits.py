@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from faceoff.kinematics import model, plain
-from faceoff.kinematics.arrays import Floats, broadcast, joints
-from faceoff.kinematics.poses import forward, heights
+from . import model, plain
+from .arrays import Floats, broadcast, joints
+from .poses import forward, heights
 
 # What the rules allow for each joint, ±: rad and rad/s.
 _MAX_POSITION_RAD = model.LIMIT_FRACTION * np.array(model.POSITION_LIMIT_RAD)

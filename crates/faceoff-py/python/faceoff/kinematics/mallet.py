@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from faceoff.kinematics import model
-from faceoff.kinematics.arrays import Floats
-from faceoff.kinematics.poses import forward, inverse
+from . import model
+from .arrays import Floats
+from .poses import forward, inverse
 
 #: Allowed region of the mallet, m in the robot's base frame: lowest and highest [x, y]. The end effector's constraint
 #: begins 2 cm beyond it, except towards the middle of the table, where the arm's reach ends.

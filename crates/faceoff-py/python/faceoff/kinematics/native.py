@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from faceoff import _native
-from faceoff.kinematics import model
-from faceoff.kinematics.arrays import Floats, broadcast, joints, points
-from faceoff.kinematics.limits import Constraints, speed_share
+from . import model
+from .arrays import Floats, broadcast, joints, points
+from .limits import Constraints, speed_share
 
 __all__ = [
     "Constraints",

@@ -6,8 +6,8 @@ The algorithms are those of `faceoff.kinematics.plain`, which explains them, app
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from faceoff.kinematics import model, plain
-from faceoff.kinematics.arrays import Floats, broadcast, joints, points
+from . import model, plain
+from .arrays import Floats, broadcast, joints, points
 
 _OFFSETS = np.array(model.LINK_OFFSET_M)
 _MOUNTS = np.array(model.LINK_MOUNT)

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from faceoff.kinematics import model
-from faceoff.kinematics.arrays import Floats, finite, joints, points
-from faceoff.kinematics.limits import constraints, speed_share_unchecked
-from faceoff.kinematics.poses import is_solution, posture, posture_rates
+from . import model
+from .arrays import Floats, finite, joints, points
+from .limits import constraints, speed_share_unchecked
+from .poses import is_solution, posture, posture_rates
 
 INTERPOLATIONS = (1, 2, 3, 4, 5, -1, None)
 """The interpolation codes of the protocol."""
