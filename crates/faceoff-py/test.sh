@@ -44,7 +44,7 @@ case ${1:-} in
         "$target/python-test/bin/python" -m mypy --config-file "$here/pyproject.toml" "$here/python/faceoff"
         "$target/python-test/bin/python" -m mypy --config-file "$here/pyproject.toml" "$root"/agents/examples/*.py
         export TARGET_DIR="$target" FACEOFF_BIN="${FACEOFF_BIN:-$target/debug/faceoff}"
-        FACEOFF_OLD_READERS="$target/python-old-readers" FACEOFF_SKIP_NOTHING=1 \
+        FACEOFF_READERS="$target/python-readers" FACEOFF_SKIP_NOTHING=1 \
             "$target/python-test/bin/python" -m pytest -p no:cacheprovider -rs --durations 12 --rootdir "$here" \
             "$here/tests" "$root/agents/examples" "$@"
         ;;

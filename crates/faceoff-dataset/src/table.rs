@@ -1,5 +1,6 @@
 //! The Parquet tables of evaluations (control steps, episodes) and of games: their columns, and writing of their rows.
 
+mod column_orders;
 mod columns;
 mod episodes;
 mod game;

@@ -1,11 +1,12 @@
-"""Recordings and exports are read by old Parquet readers and an old NumPy.
+"""Recordings and exports are read by old Parquet readers, by readers of other origin, and by an old NumPy.
 
-They are installed once, in a separate environment: `FACEOFF_OLD_READERS` names its folder
-(default: `target/python/old-readers`).
+Readers are installed once, in an environment for each file of requirements beside this one, in the folder that
+`FACEOFF_READERS` names (default: `target/python-readers`).
 """
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
@@ -16,13 +17,12 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("pyarrow")
+pq = pytest.importorskip("pyarrow.parquet")
 
 import faceoff.dataset as fd  # noqa: E402
 from dataset_recordings import FIXTURES, PROGRAM, ROOT, game, hold, odd  # noqa: E402
 
 HERE = Path(__file__).parent
-REQUIREMENTS = HERE / "requirements-old-readers.txt"
 
 # Control steps in the fixture dataset-layout-3.zip.
 LAYOUT_3_STEPS = 1149
@@ -59,27 +59,45 @@ print(len(steps))
 """
 
 
+# Reads a column of numbers, one of texts and the actions of a table; prints them with all bits.
+READ_COLUMNS = """
+import json, sys
+reader, path = sys.argv[1:]
+if reader == "fastparquet":
+    import fastparquet
+    frame = fastparquet.ParquetFile(path).to_pandas()
+    columns = {name: frame[name].tolist() for name in ("puck_x", "task", "step", "action")}
+else:
+    import polars
+    frame = polars.read_parquet(path)
+    columns = {name: frame[name].to_list() for name in ("puck_x", "task", "step", "action")}
+print(json.dumps(columns, default=float))
+"""
+
+
 @cache
-def python() -> Path:
-    """The interpreter of the environment with the old readers."""
-    folder = Path(os.environ.get("FACEOFF_OLD_READERS", ROOT / "target" / "python" / "old-readers"))
+def python(readers: str) -> Path:
+    """The interpreter of the environment with these readers."""
+    folder = Path(os.environ.get("FACEOFF_READERS", ROOT / "target" / "python-readers")) / readers
     base = sys.executable if sys.version_info[:2] == (3, 11) else shutil.which("python3.11")
     if base is None:
-        pytest.skip("pyarrow 12 has no wheel for this Python, and there is no python3.11 here")
+        pytest.skip("some of these readers have no wheel for this Python, and there is no python3.11 here")
     subprocess.run(
-        [ROOT / "tests" / "python-environment.sh", folder, REQUIREMENTS], env={**os.environ, "PYTHON": base}, check=True
+        [ROOT / "tests" / "python-environment.sh", folder, HERE / f"requirements-{readers}-readers.txt"],
+        env={**os.environ, "PYTHON": base},
+        check=True,
     )
     return folder / "bin" / "python"
 
 
-def run(*arguments: object) -> str:
+def run(*arguments: object, readers: str = "old") -> str:
     environment = {
         **os.environ,
         "PYTHONPATH": str(ROOT / "crates" / "faceoff-py" / "python"),
         "FACEOFF_BIN": str(PROGRAM),
     }
     done = subprocess.run(
-        [python(), *map(str, arguments)],
+        [python(readers), *map(str, arguments)],
         env=environment,
         capture_output=True,
         text=True,
@@ -87,6 +105,49 @@ def run(*arguments: object) -> str:
     )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
+
+
+def expected_columns() -> dict[str, list[object]]:
+    table = fd.open_dataset(hold()).table(columns=["puck_x", "task", "step", "action"])
+    return {name: table[name].to_pylist() for name in table.column_names}
+
+
+def test_polars_1_0_reads_recordings(tmp_path: Path) -> None:
+    with zipfile.ZipFile(hold() / "dataset.zip") as packed:
+        path = packed.extract("steps.parquet", tmp_path)
+    assert json.loads(run("-c", READ_COLUMNS, "polars", path, readers="polars")) == expected_columns()
+
+
+@pytest.mark.parametrize("reader", ["fastparquet", "polars"])
+def test_other_readers_read_the_export_of_plain_parquet(reader: str, tmp_path: Path) -> None:
+    """Polars here is 0.18, of 2023."""
+    fd.to_parquet(fd.open_dataset(hold()), tmp_path / "plain")
+    path = tmp_path / "plain" / "steps.parquet"
+    assert json.loads(run("-c", READ_COLUMNS, reader, path, readers="other")) == expected_columns()
+
+
+def test_plain_parquet_has_all_tables_with_the_same_values(tmp_path: Path) -> None:
+    for name, recording in {"dataset": fd.open(odd()), "game": fd.open(game())}.items():
+        files = fd.to_parquet(recording, tmp_path / name)
+        assert {file.name for file in files} == {n for n in recording.manifest["files"] if n.endswith(".parquet")}
+        for file in files:
+            got, expected = pq.ParquetFile(file), recording._container.table(file.name)
+            chunk = got.metadata.row_group(0).column(3)
+            assert (chunk.compression, set(chunk.encodings) - {"RLE"}) == ("SNAPPY", {"PLAIN"})
+            assert got.read().to_pylist() == expected.read().to_pylist()
+
+
+def test_plain_parquet_refuses_an_existing_folder_and_leaves_nothing(tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir()
+    with pytest.raises(fd.ExistsError, match="out: .*there is there already; name another folder"):
+        fd.to_parquet(fd.open(hold()), tmp_path / "there")
+    damaged = tmp_path / "damaged"
+    with zipfile.ZipFile(hold() / "dataset.zip") as packed:
+        packed.extractall(damaged)
+    (damaged / "steps.parquet").write_bytes(b"PAR1" + bytes(100) + b"PAR1")
+    with pytest.raises(fd.DatasetError):
+        fd.to_parquet(fd.open(damaged), tmp_path / "new")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["damaged", "there"]
 
 
 def test_pyarrow_12_and_duckdb_read_recordings() -> None:

@@ -339,7 +339,7 @@ def test_mallet_commands_agree_between_both_inverses() -> None:
 
 
 @pytest.mark.parametrize("name", ["faceoff/kinematics", "arm", "lib/geometry/robot"])
-def test_package_folder_works_under_any_name_without_the_compiled_half(name: str, tmp_path: Path) -> None:
+def test_folder_under_any_name_needs_no_compiled_half(name: str, tmp_path: Path) -> None:
     """The folder is copied alone, as in a bundle."""
     shutil.copytree(Path(arm.__file__).parent, tmp_path / name)
     first = name.split("/")[0]

@@ -1,6 +1,7 @@
 //! Joins the tables of an evaluation's shards (recordings of a part of its episodes) to one table.
 
 use super::{
+    column_orders::TypeOrders,
     steps::{HOST_TIME, schema_with_host_time, with_zero_host_time},
     writer::{TableWriter, schema_metadata},
 };
@@ -48,7 +49,7 @@ pub(crate) fn join<W: Write + Send>(
     temporary_dir: &Path,
     out: W,
 ) -> Result<(), RecordingError> {
-    let mut writer: Option<SerializedFileWriter<W>> = None;
+    let mut writer: Option<SerializedFileWriter<TypeOrders<W>>> = None;
     let mut out = Some(out);
     for table in tables {
         let path = table.path();
@@ -63,7 +64,7 @@ pub(crate) fn join<W: Write + Send>(
             .parse_and_finish(&file)
             .map_err(join_error())?;
         if let Some(out) = out.take() {
-            writer = Some(begin(&metadata, out).map_err(join_error())?);
+            writer = Some(begin(&metadata, TypeOrders::new(out)).map_err(join_error())?);
         }
         let Some(writer) = &mut writer else {
             break;
@@ -78,10 +79,14 @@ pub(crate) fn join<W: Write + Send>(
     }
     match writer {
         None => Err(RecordingError::Unusable("nothing to join".to_owned())),
-        Some(writer) => writer
-            .close()
-            .map(|_| ())
-            .map_err(RecordingError::unusable("joining the recordings")),
+        Some(writer) => {
+            let columns = writer.schema_descr().num_columns();
+            let mut out = writer
+                .into_inner()
+                .map_err(RecordingError::unusable("joining the recordings"))?;
+            out.finish(columns)?;
+            Ok(())
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! Writes a Parquet table, with row groups and pages of a size that lets readers find one episode quickly.
 
+use super::column_orders::TypeOrders;
 use crate::error::RecordingError;
 use arrow_array::{Array, ArrayRef, RecordBatch};
 use arrow_schema::{DataType, Schema, SchemaRef};
@@ -30,7 +31,7 @@ pub(crate) struct TableWriter {
     /// What the writer does, for error messages.
     context: String,
     schema: SchemaRef,
-    writer: ArrowWriter<File>,
+    writer: ArrowWriter<TypeOrders<File>>,
 }
 
 impl TableWriter {
@@ -57,7 +58,8 @@ impl TableWriter {
         schema: &SchemaRef,
     ) -> Result<Self, RecordingError> {
         let context = format!("writing {}", file.path().display());
-        let writer = ArrowWriter::try_new(file, schema.clone(), Some(properties(layout, schema)?))
+        let properties = Some(properties(layout, schema)?);
+        let writer = ArrowWriter::try_new(TypeOrders::new(file), schema.clone(), properties)
             .map_err(RecordingError::unusable(&context))?;
         Ok(Self {
             context,
@@ -89,10 +91,13 @@ impl TableWriter {
     }
 
     pub fn finish(mut self) -> Result<(), RecordingError> {
-        self.writer
+        let metadata = self
+            .writer
             .finish()
             .map_err(RecordingError::unusable(&self.context))?;
-        Ok(self.writer.inner().sync_all()?)
+        let columns = metadata.file_metadata().schema_descr().num_columns();
+        let file = self.writer.inner_mut().finish(columns)?;
+        Ok(file.sync_all()?)
     }
 }
 

@@ -35,6 +35,7 @@ from ._game import GAME_LAYOUTS, Game, Rally, SideArrays
 from ._layout_2023 import to_2023
 from ._lerobot import to_lerobot
 from ._minari import to_minari
+from ._parquet import to_parquet
 from ._rewards import Reward, success_at_end
 
 __all__ = [
@@ -58,6 +59,7 @@ __all__ = [
     "to_2023",
     "to_lerobot",
     "to_minari",
+    "to_parquet",
 ]
 
 del _pyarrow

@@ -10,7 +10,7 @@ from typing import Any, Sequence
 
 from faceoff.errors import ArgumentError, Error
 
-from . import Dataset, Game, open, open_dataset, to_2023, to_lerobot, to_minari
+from . import Dataset, Game, open, open_dataset, to_2023, to_lerobot, to_minari, to_parquet
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -41,13 +41,14 @@ def _parser() -> argparse.ArgumentParser:
     info.add_argument("--json", action="store_true", help="print it as a JSON object")
     info.set_defaults(run=_info)
 
-    export = commands.add_parser("export", help="write a dataset in another layout")
+    export = commands.add_parser("export", help="write a recording in another layout")
     export.add_argument("recording", help=recording)
     export.add_argument(
         "--layout",
         required=True,
-        choices=("2023", "minari", "lerobot"),
-        help="the 2023 challenge's (a folder per task), Minari, or LeRobot v3.0 (a folder per task)",
+        choices=("2023", "minari", "lerobot", "parquet"),
+        help="the 2023 challenge's (a folder per task), Minari, LeRobot v3.0 (a folder per task), or "
+        "the same tables for readers that do not know their encodings (also of a game)",
     )
     export.add_argument(
         "--out",
@@ -111,6 +112,9 @@ def _summarise_game(game: Game) -> dict[str, Any]:
 
 
 def _export(options: argparse.Namespace) -> None:
+    if options.layout == "parquet":
+        _export_parquet(options)
+        return
     dataset = open_dataset(options.recording)
     if options.layout == "minari":
         if options.id is None:
@@ -129,6 +133,15 @@ def _export(options: argparse.Namespace) -> None:
     dataset.check()
     for task in dataset.tasks if options.task is None else [options.task]:
         print(to_lerobot(dataset, f"{options.out}/{task}", task))
+
+
+def _export_parquet(options: argparse.Namespace) -> None:
+    if options.out is None:
+        raise ArgumentError("--out: expected a folder for the layout parquet, got none")
+    if options.task is not None:
+        raise ArgumentError("--task: the layout parquet has all tasks, leave it out")
+    for path in to_parquet(open(options.recording), options.out):
+        print(path)
 
 
 if __name__ == "__main__":
