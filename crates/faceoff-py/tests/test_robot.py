@@ -90,6 +90,46 @@ class TestUrdfInPinocchio:
         np.testing.assert_array_equal(robot.friction[:DRIVEN], numbers.DRY_FRICTION_N_M)
 
 
+def mass_of_mjcf(model):
+    """The arm's mass, kg, in the exported MJCF, which also has the puck."""
+    _, robot, _ = load(model)
+    return sum(robot.body_mass) - numbers.PUCK_MASS_KG
+
+
+@pytest.mark.parametrize("model", MODELS)
+class TestUrdfInOtherReaders:
+    """All load it with the mass of the MJCF; none finds a moving link without mass, or adds one."""
+
+    def test_mujoco_finds_the_mass_matrix(self, model):
+        mujoco = pytest.importorskip("mujoco")
+        robot = mujoco.MjModel.from_xml_string(exported_model("urdf", model))
+        data = mujoco.MjData(robot)
+        assert sum(robot.body_mass) == pytest.approx(mass_of_mjcf(model), abs=1e-9)
+        robot.dof_armature[:DRIVEN] = numbers.ARMATURE_KG_M2
+        q, dq = poses(20, robot.nq, seed=4)
+        for pose, rate, answer in zip(q, dq, answers(q, dq)):
+            data.qpos[:], data.qvel[:] = pose, rate
+            mujoco.mj_forward(robot, data)
+            mass, _ = dynamics_of(answer, model)
+            np.testing.assert_allclose(full_mass(mujoco, robot, data), mass, atol=1e-9)
+
+    def test_pybullet_and_pinocchio_find_the_mass(self, model, tmp_path):
+        bullet = pytest.importorskip("pybullet")
+        pin = pytest.importorskip("pinocchio")
+        path = tmp_path / "arm.urdf"
+        path.write_text(exported_model("urdf", model))
+        bullet.connect(bullet.DIRECT)
+        try:
+            robot = bullet.loadURDF(str(path), useFixedBase=True)
+            links = range(-1, bullet.getNumJoints(robot))
+            total = sum(bullet.getDynamicsInfo(robot, link)[0] for link in links)
+        finally:
+            bullet.disconnect()
+        expected = mass_of_mjcf(model)
+        assert total == pytest.approx(expected, abs=1e-9)
+        assert pin.computeTotalMass(pin.buildModelFromXML(path.read_text())) == pytest.approx(expected, abs=1e-9)
+
+
 def load(model="plant"):
     mujoco = pytest.importorskip("mujoco")
     loaded = mujoco.MjModel.from_xml_string(exported_model("mjcf", model))

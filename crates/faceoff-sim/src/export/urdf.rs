@@ -10,6 +10,11 @@ use crate::{
 };
 use std::{f64::consts::FRAC_PI_2, fmt::Write as _};
 
+/// Mass and inertia of the link between the two hinges of the universal joint, which the simulator does not have. Readers need some: MuJoCo
+/// refuses a moving link without mass, and PyBullet gives it 1 kg. They change the mass matrix by less than 1e-10.
+const UNIVERSAL_MASS_KG: f64 = 1e-11;
+const UNIVERSAL_INERTIA_KG_M2: f64 = 1e-14;
+
 /// The arm as URDF 1.0: links `base`, `link_1` … `link_7`, `end_effector` and, of the plant, `mallet`; joints
 /// `joint_1` … `joint_7`, `universal_y`, `universal_x`. Its root is the robot's base frame. SI units, radians.
 ///
@@ -114,7 +119,10 @@ fn universal_joint(out: &mut String) -> std::fmt::Result {
         limit(out, FRAC_PI_2, TORQUE_LIMIT_N_M, 1000.0)?;
         writeln!(out, "  </joint>")?;
         if child == "universal" {
-            writeln!(out, "  <link name=\"universal\"/>")?;
+            writeln!(out, "  <link name=\"universal\">")?;
+            let i = UNIVERSAL_INERTIA_KG_M2;
+            inertial(out, UNIVERSAL_MASS_KG, [0.0; 3], [i, i, i, 0.0, 0.0, 0.0])?;
+            writeln!(out, "  </link>")?;
         }
     }
     writeln!(out, "  <link name=\"mallet\">")?;
