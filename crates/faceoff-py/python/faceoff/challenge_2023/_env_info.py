@@ -15,7 +15,8 @@ from faceoff.challenge_2023._constraints import (
     JointVelocityConstraint,
     LinkConstraint,
 )
-from faceoff.challenge_2023._stand_ins import Box, MDPInfo, RobotData, RobotModel
+from faceoff.challenge_2023._mujoco_model import robot_objects
+from faceoff.challenge_2023._stand_ins import Box, MDPInfo
 from faceoff.kinematics import model
 
 ENV_NAMES = {"hit": "7dof-hit", "defend": "7dof-defend", "prepare": "7dof-prepare", "tournament": "tournament"}
@@ -74,7 +75,7 @@ def _robot(agent_id: int, env: Mapping[str, Any]) -> dict[str, Any]:
     ]
     # The protocol has the agent's own robot first.
     robot["base_frame"] = frames if agent_id == 1 else frames[::-1]
-    robot["robot_model"], robot["robot_data"] = RobotModel(), RobotData()
+    robot["robot_model"], robot["robot_data"] = robot_objects()
     return robot
 
 

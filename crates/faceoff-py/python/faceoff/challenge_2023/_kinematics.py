@@ -1,7 +1,8 @@
 """`air_hockey_challenge.utils.kinematics`: the functions of 2023 for one pose, with NumPy instead of MuJoCo.
 
-Points are in the robot's base frame, m; joint positions in rad. The first two arguments are the stand-ins of `env_info`.
-As in 2023, each call leaves its joint positions in the second one, and `inverse_kinematics` starts from there by default.
+Points are in the robot's base frame, m; joint positions in rad. The first two arguments are `robot_model` and `robot_data`
+of `env_info`. As in 2023, each call leaves its joint positions in the second one, and `inverse_kinematics` starts from there
+by default.
 """
 
 from __future__ import annotations
@@ -11,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from faceoff.challenge_2023._arguments import Floats, array, one_of
-from faceoff.errors import ArgumentError, ArgumentTypeError
+from faceoff.challenge_2023._mujoco_model import check_robot, update_positions
+from faceoff.errors import ArgumentError
 from faceoff.kinematics import model
 
 LINKS = ("1", "2", "3", "4", "5", "6", "7", "ee")
@@ -76,16 +78,18 @@ def link_jacobian(origins: Floats, rotations: Floats, link: int) -> Floats:
 
 def forward_kinematics(mj_model: Any, mj_data: Any, q: Any, link: str = "ee") -> tuple[Floats, Floats]:
     """Position (3,), m, and rotation (3, 3) of a link in the robot's base frame at `q` (7,), rad."""
+    check_robot(mj_model, mj_data)
     index, pose = _link(link), _pose("q", q)
-    _store(mj_data, pose)
+    _store(mj_model, mj_data, pose)
     origins, rotations = frames(pose)
     return origins[index].copy(), rotations[index].copy()
 
 
 def jacobian(mj_model: Any, mj_data: Any, q: Any, link: str = "ee") -> Floats:
     """(6, 7): how a link's position (m) and rotation (rad) change with each joint at `q` (7,), rad."""
+    check_robot(mj_model, mj_data)
     index, pose = _link(link), _pose("q", q)
-    _store(mj_data, pose)
+    _store(mj_model, mj_data, pose)
     return link_jacobian(*frames(pose), index)
 
 
@@ -107,12 +111,13 @@ def inverse_kinematics(
     Damped least squares within 95 % of the joints' ranges, as in 2023: the result depends on `initial_q`, and may have an
     elbow or wrist that is too low. `faceoff.kinematics.inverse` avoids both.
     """
+    check_robot(mj_model, mj_data)
     index = _link(link)
     if desired_position is None and desired_rotation is None:
         raise ArgumentError("desired_position: expected three numbers, or a desired_rotation, got None for both")
     position = None if desired_position is None else array("desired_position", desired_position, (3,))
     rotation = None if desired_rotation is None else array("desired_rotation", desired_rotation, (3, 3))
-    q = _pose("initial_q", _qpos(mj_data) if initial_q is None else initial_q).copy()
+    q = _pose("initial_q", mj_data.qpos if initial_q is None else initial_q).copy()
     success = False
     for iteration in range(_ITERATIONS + 1):
         origins, rotations = frames(q)
@@ -134,7 +139,7 @@ def inverse_kinematics(
         if size > _GIVE_UP_RATIO * length:
             break
         q = np.clip(q + step * min(1.0, _STEP_LIMIT_RAD / length), -_BOUND, _BOUND)
-    _store(mj_data, q)
+    _store(mj_model, mj_data, q)
     return success, q
 
 
@@ -172,16 +177,7 @@ def _pose(name: str, q: Any) -> Floats:
     return array(name, q, (model.JOINTS,))
 
 
-def _qpos(mj_data: Any) -> Any:
-    if not hasattr(mj_data, "qpos"):
-        raise ArgumentTypeError(
-            f"mj_data: expected env_info['robot']['robot_data'], got {type(mj_data).__name__}; the first two arguments are "
-            "robot_model and robot_data"
-        )
-    return mj_data.qpos
-
-
-def _store(mj_data: Any, q: Floats) -> None:
+def _store(mj_model: Any, mj_data: Any, q: Floats) -> None:
     """Leaves the joint positions in the second argument, where the functions of 2023 computed."""
-    _qpos(mj_data)
     mj_data.qpos = q.copy()
+    update_positions(mj_model, mj_data)

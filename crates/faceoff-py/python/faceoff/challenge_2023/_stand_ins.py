@@ -26,8 +26,9 @@ class _StandIn:
             raise AttributeError(name)
         known = ", ".join(sorted(vars(self)))
         raise StandInError(
-            f"{self._replaces}.{name}: expected one of {known}, because MuJoCo is not part of a bundle; use "
-            "forward_kinematics, inverse_kinematics and jacobian of air_hockey_challenge.utils instead"
+            f"{self._replaces}.{name}: expected one of {known}, because MuJoCo is not installed; use "
+            "forward_kinematics, inverse_kinematics and jacobian of air_hockey_challenge.utils, or bring MuJoCo in a "
+            "container image"
         )
 
 
