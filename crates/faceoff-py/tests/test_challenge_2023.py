@@ -16,8 +16,9 @@ from agents_2023 import HELLO, LONG_TIME_LIMITS, OBSERVATION, TEAM, answers_of, 
 from program import PROGRAM, REPOSITORY
 
 import faceoff
-from faceoff.challenge_2023 import adapt, make_bundle, play
+from faceoff.challenge_2023 import adapt, install_substitute, make_bundle, play
 from faceoff.challenge_2023._kinematics import forward_kinematics, inverse_kinematics, jacobian
+from faceoff.challenge_2023._loading import load_builder
 from faceoff.challenge_2023._stand_ins import RobotData, RobotModel
 from faceoff.dataset import Game
 from faceoff.dataset import open as open_recording
@@ -205,19 +206,16 @@ def test_objects_that_are_no_agents_are_refused(tmp_path: Path) -> None:
 def test_other_package_of_2023_in_the_process_is_refused(
     own_imports: None, bundle: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from faceoff.challenge_2023._loading import load_builder
-
     monkeypatch.setitem(sys.modules, "air_hockey_challenge", type(sys)("air_hockey_challenge"))
-    with pytest.raises(faceoff.OrderError, match="air_hockey_challenge: expected that it is not imported yet"):
-        load_builder(bundle / "team")
+    for call in (install_substitute, lambda: load_builder(bundle / "team")):
+        with pytest.raises(faceoff.OrderError, match="air_hockey_challenge: expected that it is not imported yet"):
+            call()
 
 
 def test_agent_acts_alike_with_and_without_mujoco(
     own_imports: None, bundle: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("mujoco")
-    from faceoff.challenge_2023._loading import load_builder
-
     build_agent = load_builder(bundle / "team")
     messages = [HELLO, {"type": "reset", "episode": 0}]
     messages += [{"type": "step", "step": step, "obs": OBSERVATION} for step in range(20)]

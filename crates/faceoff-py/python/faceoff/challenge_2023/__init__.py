@@ -8,6 +8,7 @@ constraints. Everything here needs only NumPy. It does not simulate: the simulat
 from faceoff.challenge_2023._adapter import Adapter, adapt, play
 from faceoff.challenge_2023._bundle import make_bundle
 from faceoff.challenge_2023._env_info import env_info
+from faceoff.challenge_2023._loading import install_substitute
 from faceoff.challenge_2023._stand_ins import StandInError
 
-__all__ = ["Adapter", "StandInError", "adapt", "env_info", "make_bundle", "play"]
+__all__ = ["Adapter", "StandInError", "adapt", "env_info", "install_substitute", "make_bundle", "play"]

@@ -29,20 +29,15 @@ _ADVICE = {
 }
 
 
-def prepare_imports(team: Path) -> None:
-    """Makes a team's folder, and the substitute of `air_hockey_challenge`, importable."""
+def install_substitute() -> None:
+    """Makes the substitute of `air_hockey_challenge` importable in this process."""
     loaded = sys.modules.get("air_hockey_challenge")
     if loaded is not None and not _is_below(getattr(loaded, "__file__", None), SUBSTITUTE):
         raise OrderError(
             f"air_hockey_challenge: expected that it is not imported yet, got {getattr(loaded, '__file__', None)}; load the "
             "agent in a process of its own"
         )
-    # Modules of a team may also import each other by their plain names.
-    for folder in (team / PACKAGE, team, SUBSTITUTE):
-        path = str(folder)
-        if path in sys.path:
-            sys.path.remove(path)
-        sys.path.insert(0, path)
+    _search_first(SUBSTITUTE)
 
 
 def load_builder(team: Path) -> Builder:
@@ -50,7 +45,10 @@ def load_builder(team: Path) -> Builder:
 
     The working folder becomes `team`: in 2023 agents were started from the folder above their package.
     """
-    prepare_imports(team)
+    # Modules of a team may also import each other by their plain names.
+    _search_first(team / PACKAGE)
+    _search_first(team)
+    install_substitute()
     os.chdir(team)
     try:
         module = importlib.import_module(f"{PACKAGE}.agent_builder")
@@ -83,6 +81,13 @@ def explain(error: ImportError) -> MissingError:
     if isinstance(error, ModuleNotFoundError):
         return MissingError(f"import of {name}: expected a module of the bundle or its runtime, got none; {advice}")
     return MissingError(f"import from {name}: expected a name that it has, got {error}; {advice}")
+
+
+def _search_first(folder: Path) -> None:
+    path = str(folder)
+    if path in sys.path:
+        sys.path.remove(path)
+    sys.path.insert(0, path)
 
 
 def _is_below(path: str | None, folder: Path) -> bool:

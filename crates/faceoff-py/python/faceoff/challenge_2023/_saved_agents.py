@@ -11,13 +11,17 @@ import copy
 import json
 import pickle
 from pathlib import Path
-from typing import IO, Any, Self
+from typing import IO, TYPE_CHECKING, Any
 from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 
 from faceoff.challenge_2023 import _stand_ins
 from faceoff.errors import ArgumentError
+
+if TYPE_CHECKING:
+    # Bundles also run on Python 3.10, which does not have it.
+    from typing import Self
 
 #: Names of the entry that describes an object, in newer and older versions of MushroomRL.
 _DESCRIPTIONS = ("config", "agent.config")
