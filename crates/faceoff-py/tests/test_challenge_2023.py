@@ -16,7 +16,7 @@ from agents_2023 import HELLO, LONG_TIME_LIMITS, OBSERVATION, TEAM, answers_of, 
 from program import PROGRAM, REPOSITORY
 
 import faceoff
-from faceoff.challenge_2023 import adapt, install_substitute, make_bundle, play
+from faceoff.challenge_2023 import Adapter, adapt, install_substitute, make_bundle, play
 from faceoff.challenge_2023._kinematics import forward_kinematics, inverse_kinematics, jacobian
 from faceoff.challenge_2023._loading import load_builder
 from faceoff.challenge_2023._stand_ins import RobotData, RobotModel
@@ -201,6 +201,9 @@ def test_objects_that_are_no_agents_are_refused(tmp_path: Path) -> None:
         adapt(builder(), {"interpolation_order": 0})
     with pytest.raises(faceoff.ArgumentError, match="bundle: expected a folder made by python -m faceoff.challenge_2023"):
         play(tmp_path)
+    with pytest.raises(faceoff.ArgumentTypeError, match="bundle: expected the path of a folder, got 3"):
+        play(3)  # type: ignore[arg-type]
+    assert "OrderError: Adapter: expected a class made by adapt" in answers_of(Adapter, HELLO)[-1]["error"]
 
 
 def test_other_package_of_2023_in_the_process_is_refused(

@@ -123,19 +123,19 @@ def test_arguments_of_make_bundle_are_checked(tmp_path: Path) -> None:
 
 
 def test_missing_packages_are_named_with_advice(tmp_path: Path) -> None:
-    for module, advice in [
-        ("torch", "bring it in a container image"),
-        ("mushroom_rl.core", "compute it with NumPy"),
-        ("air_hockey_challenge.environments", "train with the environments of faceoff.gym"),
-        ("air_hockey_challenge.utils.replay_dataset", "docs/from-2023.md"),
-        ("baseline.baseline_agent", "convert the folder above"),
+    for statement, error, advice in [
+        ("import torch", "import of torch: expected a module", "bring it in a container image"),
+        ("from mushroom_rl.core import Agent", "import of mushroom_rl", "compute it with NumPy"),
+        ("import air_hockey_challenge.environments", "air_hockey_challenge.environments: expected", "faceoff.gym"),
+        ("import air_hockey_challenge.utils.plots", "import of air_hockey_challenge.utils.plots", "from-2023.md"),
+        ("from air_hockey_challenge.utils import plot", "expected that it succeeds, got: cannot import name", "from-2023.md"),
+        ("from baseline.baseline_agent import X", "import of baseline", "convert the folder above"),
     ]:
-        folder = team_with(tmp_path / module / "team", agent_builder__py=f"import {module}\n" + BUILDER)
-        make_bundle(folder, tmp_path / module / "bundle")
-        done = program("eval", tmp_path / module / "bundle", "--task", "defend", "--episodes", 1, "--out", tmp_path / "out")
-        assert done.returncode != 0
+        place = tmp_path / statement.replace(" ", "-")
+        make_bundle(team_with(place / "team", agent_builder__py=f"{statement}\n{BUILDER}"), place / "bundle")
+        done = program("eval", place / "bundle", "--task", "defend", "--episodes", 1, "--out", place / "out")
         text = done.stderr + done.stdout
-        assert module in text and advice in text, text
+        assert done.returncode != 0 and error in text and advice in text, text
 
 
 def test_configuration_is_read_as_by_pyyaml(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -235,6 +235,7 @@ def test_constraint_lists_accept_constraints_of_teams() -> None:
     assert not constraints.keys() and constraints.get("slow") is None
     for call, message in [
         (lambda: constraints.delete("slow"), "name: expected one of the list's, no constraint, got 'slow'"),
+        (lambda: Constraint(info, 0), "output_dim: expected a whole number from 1, got 0"),
         (lambda: constraints.add(3), "c: expected a Constraint, got 3"),  # type: ignore[arg-type]
         (lambda: info["constraints"].fun(Q[0, :6], Q[0]), r"q: expected shape \(7,\), got \(6,\)"),
     ]:

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from agents_2023 import AWAY, ENV, HOME, ROBOT
+from agents_2023 import AWAY, ENV, HOME, ROBOT, TEAM
+from program import REPOSITORY
 
 import faceoff
 from faceoff import kinematics
@@ -92,6 +93,12 @@ def test_env_info_arguments_are_checked() -> None:
         (("hit", True, ENV), "agent_id: expected one of 1, 2, got True"),
         (("hit", 1, without), "env: expected the key 'table', got dt, .*; give the env of the message hello"),
         (("hit", 1, None), "env: expected a mapping with the key 'robot', got None"),
+        (("hit", 1, {**ENV, "table": 3}), r"env\['table'\]: expected a mapping with the key 'length', got 3"),
+        (("hit", 1, {**ENV, "puck": {"radius": "wide"}}), r"env\['puck'\]\['radius'\]: expected a finite number, got 'wide'"),
+        (("hit", 1, {**ENV, "joint_pos_ids": 6}), r"env\['joint_pos_ids'\]: expected a list of indices, got 6"),
+        (("hit", 1, {**ENV, "dt": float("nan")}), r"env\['dt'\]: expected a finite number, got nan"),
+        (("hit", 1, {**ENV, "n_agents": 3}), r"env\['n_agents'\]: expected one of 1, 2, got 3"),
+        (("hit", 1, {**ENV, "robot": {**ENV["robot"], "base_frame": 1}}), "base_frame'\\]: expected a list of 4×4"),
         (("hit", 1, short), r"joint_pos_limit'\]: expected shape \(2, 7\), got \(2, 6\)"),
     ]:
         with pytest.raises(faceoff.Error, match=message):
@@ -111,6 +118,9 @@ def test_getters_return_their_slices(info: dict[str, Any]) -> None:
     position, rotation = agent.get_ee_pose(observation)
     np.testing.assert_allclose(position, kinematics.forward(model.START_Q), atol=1e-12)
     assert rotation.shape == (3, 3)
+    for wrong in ([0.0] * 20, np.zeros(8), None):
+        with pytest.raises(faceoff.ArgumentError, match="obs: expected the array that draw_action gets"):
+            agent.get_joint_pos(wrong)  # type: ignore[arg-type]
     # Slices are copies: an agent may change them.
     agent.get_joint_pos(observation)[:] = 0.0
     assert observation[7] != 0.0
@@ -187,6 +197,9 @@ def test_files_that_are_no_agents_are_refused(info: dict[str, Any], tmp_path: Pa
     for name, message in [("none", "which is no file"), ("text", r"\(ZIP\)"), ("empty.zip", "entry 'config'")]:
         with pytest.raises(faceoff.ArgumentError, match=f"path: expected .*{message}"):
             AgentBase.load_agent(tmp_path / name, info)
+    for call in (AgentBase.load, AgentBase(info).save):
+        with pytest.raises(faceoff.ArgumentTypeError, match="path: expected the path of a file, got 3"):
+            call(3)  # type: ignore[arg-type]
     with pytest.raises(faceoff.ArgumentError, match="_add_save_attr: gain: expected one of primitive, .*, got 'yaml'"):
         AgentBase(info)._add_save_attr(gain="yaml")
 
@@ -234,3 +247,21 @@ def test_simulator_and_evaluation_of_2023_are_refused_in_use() -> None:
     ]:
         with pytest.raises(MissingError, match=f"^{name}: expected .*, got .*; .*{advice}"):
             call("7dof-hit", interpolation_order=3)
+
+
+DOCUMENT = (REPOSITORY / "docs" / "from-2023.md").read_text()
+
+
+def test_program_of_the_document_runs() -> None:
+    program = DOCUMENT.split("```python\n")[1].split("```")[0]
+    done = subprocess.run([sys.executable, "-c", program], cwd=TEAM, stdin=subprocess.DEVNULL, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_document_names_keys_and_penalty_points(info: dict[str, Any]) -> None:
+    for key in set(info) - {key for key in info if key.endswith("_ids")}:
+        assert f"`{key}`" in DOCUMENT, key
+    points = _unavailable.PENALTY_POINTS
+    for group in ("ee_constr", "link_constr", "joint_pos_constr", "joint_vel_constr"):
+        assert f"`{group}` {points[group]}" in DOCUMENT, group
+    assert f"computation time {points['computation_time_minor']} to {points['computation_time_major']}" in DOCUMENT

@@ -10,11 +10,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from faceoff.agent import SHAPES, Agent, run
-from faceoff.challenge_2023._arguments import Floats
+from faceoff.challenge_2023._arguments import Floats, path_of
 from faceoff.challenge_2023._config import builder_arguments, interpolation_order
 from faceoff.challenge_2023._env_info import env_info
 from faceoff.challenge_2023._loading import Builder, checked_builder, explain, load_builder
-from faceoff.errors import ArgumentError, ArgumentTypeError
+from faceoff.errors import ArgumentError, ArgumentTypeError, OrderError
 
 TEAM_FOLDER = "team"
 """The folder of a bundle with the team's files, unchanged."""
@@ -29,13 +29,16 @@ class Adapter(Agent):
     `adapt` and `play` make classes derived from it.
     """
 
-    load: ClassVar[Callable[[], Builder]]
-    """Returns `build_agent`."""
-    config: ClassVar[Mapping[str, Any]]
+    config: ClassVar[Mapping[str, Any]] = {}
     """The content of `agent_config.yml`."""
 
     agent: Any
     """The agent of 2023."""
+
+    @staticmethod
+    def load() -> Builder:
+        """Returns `build_agent`."""
+        raise OrderError("Adapter: expected a class made by adapt, got Adapter; call adapt(build_agent) and use its result")
 
     def start(self) -> None:
         self.interpolation = interpolation_order(self.config)
@@ -77,7 +80,7 @@ def adapt(build_agent: Callable[..., Any], config: Mapping[str, Any] | None = No
 
 def play(bundle: str | Path) -> None:
     """Plays the agent of a converted bundle over standard input and output: the program of the bundle."""
-    folder = Path(bundle).resolve()
+    folder = path_of("bundle", bundle, "a folder").resolve()
     path = folder / CONFIG_FILE
     try:
         config = json.loads(path.read_text(encoding="utf-8"))

@@ -10,6 +10,7 @@ from typing import Any
 from faceoff.challenge_2023._arguments import Floats, entry
 from faceoff.challenge_2023._kinematics import forward_kinematics
 from faceoff.challenge_2023._saved_agents import Savable
+from faceoff.errors import ArgumentError
 
 Preprocessor = Callable[[Floats], Floats]
 
@@ -121,5 +122,10 @@ class AgentBase(Savable):
         return forward_kinematics(self.robot_model, self.robot_data, self.get_joint_pos(obs))
 
     def _part(self, obs: Floats, key: str) -> Floats:
-        part: Floats = obs[self.env_info[key]]
+        try:
+            part: Floats = obs[self.env_info[key]]
+        except (TypeError, IndexError) as error:
+            raise ArgumentError(
+                f"obs: expected the array that draw_action gets, of 20 or 23 numbers, got {obs!r:.80}: {error}"
+            ) from error
         return part

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,6 +27,20 @@ def array(name: str, value: object, *shapes: tuple[int, ...]) -> Floats:
     if not np.isfinite(numbers).all():
         raise ArgumentError(f"{name}: expected finite numbers, got {numbers[~np.isfinite(numbers)].flat[0]}")
     return numbers
+
+
+def number(name: str, value: object) -> float:
+    """``value`` if it is a finite number."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
+        raise ArgumentTypeError(f"{name}: expected a finite number, got {value!r:.80}")
+    return value
+
+
+def path_of(name: str, value: object, kind: str) -> Path:
+    """``value`` as a path; `kind` says in the error message what it should be the path of."""
+    if not isinstance(value, (str, os.PathLike)) or not os.fspath(value):
+        raise ArgumentTypeError(f"{name}: expected the path of {kind}, got {value!r:.80}")
+    return Path(value)
 
 
 def one_of(name: str, value: object, choices: Iterable[object]) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import faceoff
 from faceoff.challenge_2023._adapter import CONFIG_FILE, TEAM_FOLDER
+from faceoff.challenge_2023._arguments import path_of
 from faceoff.challenge_2023._config import interpolation_order, read_config
 from faceoff.challenge_2023._loading import PACKAGE
 from faceoff.errors import ArgumentError, ArgumentTypeError
@@ -55,7 +56,7 @@ def make_bundle(
 
     The team's files are copied unchanged. Nothing remains of a bundle that could not be completed.
     """
-    source, target = _path("folder", folder), _path("bundle", bundle)
+    source, target = (path_of(key, value, "a folder").absolute() for key, value in (("folder", folder), ("bundle", bundle)))
     title = _text("name", target.name if name is None else name, _NAME_LENGTH_MAX)
     _text("runtime", runtime, _NAME_LENGTH_MAX)
     package = _find_package(source)
@@ -81,13 +82,6 @@ def make_bundle(
     except BaseException:
         shutil.rmtree(unfinished, ignore_errors=True)
         raise
-
-
-def _path(name: str, value: object) -> Path:
-    if not isinstance(value, (str, os.PathLike)) or not os.fspath(value):
-        raise ArgumentTypeError(f"{name}: expected the path of a folder, got {value!r}")
-    path = Path(os.path.abspath(os.fspath(value)))
-    return path
 
 
 def _text(name: str, value: object, longest: int) -> str:

@@ -22,6 +22,8 @@ class Constraint:
     """One group of constraints. A class of your own overrides `_fun` and `_jacobian`."""
 
     def __init__(self, env_info: Any, output_dim: int, **kwargs: Any) -> None:
+        if isinstance(output_dim, bool) or not isinstance(output_dim, int) or output_dim < 1:
+            raise ArgumentError(f"output_dim: expected a whole number from 1, got {output_dim!r:.80}")
         self._env_info = env_info
         self._name: str | None = None
         self.output_dim = output_dim

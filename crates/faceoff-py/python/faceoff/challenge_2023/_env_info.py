@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from faceoff.challenge_2023._arguments import Floats, array, entry, one_of
+from faceoff.challenge_2023._arguments import Floats, array, entry, number, one_of
 from faceoff.challenge_2023._constraints import (
     ConstraintList,
     EndEffectorConstraint,
@@ -17,6 +17,7 @@ from faceoff.challenge_2023._constraints import (
 )
 from faceoff.challenge_2023._mujoco_model import robot_objects
 from faceoff.challenge_2023._stand_ins import Box, MDPInfo
+from faceoff.errors import ArgumentTypeError
 from faceoff.kinematics import model
 
 ENV_NAMES = {"hit": "7dof-hit", "defend": "7dof-defend", "prepare": "7dof-prepare", "tournament": "tournament"}
@@ -45,33 +46,44 @@ def env_info(task: str, agent_id: int, env: Mapping[str, Any]) -> dict[str, Any]
     n_agents = entry("env", env, "n_agents")
     one_of("env['n_agents']", n_agents, (1, 2))
     info: dict[str, Any] = {
-        "table": dict(entry("env", env, "table")),
-        "puck": dict(entry("env", env, "puck")),
-        "mallet": dict(entry("env", env, "mallet")),
+        "table": _numbers(env, "table", "length", "width", "goal_width"),
+        "puck": _numbers(env, "puck", "radius"),
+        "mallet": _numbers(env, "mallet", "radius"),
         "n_agents": n_agents,
         "robot": robot,
-        "dt": entry("env", env, "dt"),
+        "dt": number("env['dt']", entry("env", env, "dt")),
         "env_name": ENV_NAMES[task],
     }
     for key in _IDS:
-        info[key] = list(entry("env", env, key))
-    info["rl_info"] = _rl_info(robot, n_agents, entry("env", env, "episode_steps"), info["dt"])
+        indices = entry("env", env, key)
+        if not isinstance(indices, list) or not all(isinstance(index, int) for index in indices):
+            raise ArgumentTypeError(f"env['{key}']: expected a list of indices, got {indices!r:.80}")
+        info[key] = list(indices)
+    steps = number("env['episode_steps']", entry("env", env, "episode_steps"))
+    info["rl_info"] = _rl_info(robot, n_agents, int(steps), info["dt"])
     info["constraints"] = _constraint_list(info)
     return info
 
 
+def _numbers(env: Mapping[str, Any], key: str, *names: str) -> dict[str, float]:
+    """The numbers of a part of `env`."""
+    part = entry("env", env, key)
+    return {name: number(f"env['{key}']['{name}']", entry(f"env['{key}']", part, name)) for name in names}
+
+
 def _robot(agent_id: int, env: Mapping[str, Any]) -> dict[str, Any]:
     received = entry("env", env, "robot")
-    robot = {
-        key: entry("env['robot']", received, key)
-        for key in ("n_joints", "ee_desired_height", "universal_height")
-    }
-    robot["control_frequency"] = round(entry("env['robot']", received, "control_frequency"))
+    robot: dict[str, Any] = dict(
+        _numbers(env, "robot", "n_joints", "ee_desired_height", "universal_height", "control_frequency")
+    )
+    robot["control_frequency"] = round(robot["control_frequency"])
     for key in _LIMITS:
         robot[key] = array(f"env['robot']['{key}']", entry("env['robot']", received, key), (2, model.JOINTS))
+    base_frames = entry("env['robot']", received, "base_frame")
+    if not isinstance(base_frames, list) or not base_frames:
+        raise ArgumentTypeError(f"env['robot']['base_frame']: expected a list of 4×4 matrices, got {base_frames!r:.80}")
     frames = [
-        array(f"env['robot']['base_frame'][{index}]", frame, (4, 4))
-        for index, frame in enumerate(entry("env['robot']", received, "base_frame"))
+        array(f"env['robot']['base_frame'][{index}]", frame, (4, 4)) for index, frame in enumerate(base_frames)
     ]
     # The protocol has the agent's own robot first.
     robot["base_frame"] = frames if agent_id == 1 else frames[::-1]

@@ -73,14 +73,14 @@ def explain(error: ImportError) -> MissingError:
     """The failed import with what was expected and what to do."""
     if isinstance(error, MissingError):
         return error
-    name = error.name or str(error)
+    name = error.name or "a module"
     advice = _ADVICE.get(
         name.partition(".")[0],
         "put it into the bundle, choose a runtime that has it (--runtime), or bring it in a container image",
     )
     if isinstance(error, ModuleNotFoundError):
         return MissingError(f"import of {name}: expected a module of the bundle or its runtime, got none; {advice}")
-    return MissingError(f"import from {name}: expected a name that it has, got {error}; {advice}")
+    return MissingError(f"import of {name}: expected that it succeeds, got: {error}; {advice}")
 
 
 def _search_first(folder: Path) -> None:

@@ -17,6 +17,7 @@ from zipfile import BadZipFile, ZipFile
 import numpy as np
 
 from faceoff.challenge_2023 import _stand_ins
+from faceoff.challenge_2023._arguments import path_of
 from faceoff.errors import ArgumentError
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ class Savable:
 
     def save(self, path: str | Path, full_save: bool = False) -> None:
         """Writes the agent into one file. `full_save` includes the attributes that are saved only on request."""
-        path = Path(path)
+        path = path_of("path", path, "a file")
         path.parent.mkdir(parents=True, exist_ok=True)
         with ZipFile(path, "w") as archive:
             _write(self, archive, full_save, "")
@@ -59,7 +60,7 @@ class Savable:
     @classmethod
     def load(cls, path: str | Path) -> Any:
         """Reads an agent from a file that `save`, of this class or of MushroomRL, has written."""
-        path = Path(path)
+        path = path_of("path", path, "a file")
         if not path.is_file():
             raise ArgumentError(f"path: expected the file of a saved agent, got {str(path)!r}, which is no file")
         try:
