@@ -1,4 +1,4 @@
-"""Shared code of the tests of `faceoff.challenge_2023`: the example team, the message `hello`, and how to start programs."""
+"""Shared code of the tests of `faceoff.challenge_2023`: the example team, the message `hello`, starting programs."""
 
 from __future__ import annotations
 

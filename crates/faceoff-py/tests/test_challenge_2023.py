@@ -110,11 +110,25 @@ def test_converted_agent_plays_both_sides_of_a_game(bundle: Path, tmp_path: Path
 
 def test_bundle_plays_in_the_sandbox_of_the_usual_runtime(bundle: Path, tmp_path: Path) -> None:
     target = os.environ.get("TARGET_DIR", str(REPOSITORY / "target"))
-    runtimes = subprocess.run([REPOSITORY / "tests" / "runtimes.sh", target], check=True, stdout=subprocess.PIPE, text=True)
+    runtimes = subprocess.run(
+        [REPOSITORY / "tests" / "runtimes.sh", target], check=True, stdout=subprocess.PIPE, text=True
+    )
     folder = Path(runtimes.stdout.rstrip("\n")) / "python3-ml"
     config = tmp_path / "faceoff.toml"
     config.write_text(LONG_TIME_LIMITS.read_text() + f'[runtimes.python3-ml]\nfolder = "{folder}"\n')
-    command = [PROGRAM, "eval", bundle, "--task", "defend", "--episodes", "2", "--config", config, "--out", tmp_path / "out"]
+    command = [
+        PROGRAM,
+        "eval",
+        bundle,
+        "--task",
+        "defend",
+        "--episodes",
+        "2",
+        "--config",
+        config,
+        "--out",
+        tmp_path / "out",
+    ]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr + done.stdout
 
@@ -130,7 +144,9 @@ def builder(**methods: Any) -> Any:
 def test_action_shape_follows_the_interpolation_order(order: int | None, shape: tuple[int, ...]) -> None:
     action = np.arange(np.prod(shape), dtype=np.float32).reshape(shape)
     agent = adapt(builder(draw_action=lambda self, observation: action), {"interpolation_order": order})
-    ready, _, act = answers_of(agent, HELLO, {"type": "reset", "episode": 0}, {"type": "step", "step": 0, "obs": OBSERVATION})
+    ready, _, act = answers_of(
+        agent, HELLO, {"type": "reset", "episode": 0}, {"type": "step", "step": 0, "obs": OBSERVATION}
+    )
     assert ready["interpolation"] == order
     assert act["action"] == action.tolist()
 
@@ -168,7 +184,10 @@ def test_agent_gets_arrays_and_episode_starts() -> None:
             return np.zeros((2, 7))
 
     answers = answers_of(
-        adapt(lambda env_info: Probe()), HELLO, {"type": "reset", "episode": 0}, {"type": "step", "step": 0, "obs": OBSERVATION}
+        adapt(lambda env_info: Probe()),
+        HELLO,
+        {"type": "reset", "episode": 0},
+        {"type": "step", "step": 0, "obs": OBSERVATION},
     )
     assert [answer["type"] for answer in answers] == ["ready", "ready", "act"]
     assert calls == ["episode_start", "reset"]
@@ -199,7 +218,9 @@ def test_objects_that_are_no_agents_are_refused(tmp_path: Path) -> None:
         adapt(builder(), "fast")  # type: ignore[arg-type]
     with pytest.raises(faceoff.ArgumentError, match="interpolation_order: expected one of"):
         adapt(builder(), {"interpolation_order": 0})
-    with pytest.raises(faceoff.ArgumentError, match="bundle: expected a folder made by python -m faceoff.challenge_2023"):
+    with pytest.raises(
+        faceoff.ArgumentError, match="bundle: expected a folder made by python -m faceoff.challenge_2023"
+    ):
         play(tmp_path)
     with pytest.raises(faceoff.ArgumentTypeError, match="bundle: expected the path of a folder, got 3"):
         play(3)  # type: ignore[arg-type]

@@ -72,7 +72,10 @@ def test_package_of_2023_and_repository_are_left_out(tmp_path: Path) -> None:
         ({"agent": BUILDER}, "expected agent_builder.py or air_hockey_agent/agent_builder.py in"),
         ({"agent_builder__py": HOLD}, "expected a function build_agent(env_info, **kwargs), got a file without it"),
         ({"agent_builder__py": "def build_agent(:"}, "expected a Python file, got invalid syntax"),
-        ({"agent_config__yml": "interpolation_order: 6\n"}, "interpolation_order: expected one of 1, 2, 3, 4, 5, -1, None, got 6"),
+        (
+            {"agent_config__yml": "interpolation_order: 6\n"},
+            "interpolation_order: expected one of 1, 2, 3, 4, 5, -1, None, got 6",
+        ),
         ({"agent_config__yml": "interpolation_order: true\n"}, "interpolation_order: expected one of"),
         ({"agent_config__yml": "start: 2023-10-06\n"}, "agent_config.yml"),
         ({"agent_config__yml": "- 3\n"}, "agent_config.yml: "),
@@ -128,7 +131,11 @@ def test_missing_packages_are_named_with_advice(tmp_path: Path) -> None:
         ("from mushroom_rl.core import Agent", "import of mushroom_rl", "compute it with NumPy"),
         ("import air_hockey_challenge.environments", "air_hockey_challenge.environments: expected", "faceoff.gym"),
         ("import air_hockey_challenge.utils.plots", "import of air_hockey_challenge.utils.plots", "from-2023.md"),
-        ("from air_hockey_challenge.utils import plot", "expected that it succeeds, got: cannot import name", "from-2023.md"),
+        (
+            "from air_hockey_challenge.utils import plot",
+            "expected that it succeeds, got: cannot import name",
+            "from-2023.md",
+        ),
         ("from baseline.baseline_agent import X", "import of baseline", "convert the folder above"),
     ]:
         place = tmp_path / statement.replace(" ", "-")
@@ -143,7 +150,9 @@ def test_configuration_is_read_as_by_pyyaml(tmp_path: Path, monkeypatch: pytest.
     path = tmp_path / "agent_config.yml"
     path.write_text(
         "--- \n# comment\n\ninterpolation_order: -1\nnothing: null\nalso:\nyes_: yes\nrate: 1.5e-3\nword: 1e-3x # no\n"
-        "path: models/best model.npz\nquoted: 'a: #b'\nenvs: [ \"7dof-hit\", 3, false ]\nempty: []\n".replace("1e-3x", "fast")
+        "path: models/best model.npz\nquoted: 'a: #b'\nenvs: [ \"7dof-hit\", 3, false ]\nempty: []\n".replace(
+            "1e-3x", "fast"
+        )
     )
     assert read_config(path) == {
         "interpolation_order": -1, "nothing": None, "also": None, "yes_": True, "rate": 0.0015, "word": "fast",

@@ -94,7 +94,10 @@ def test_env_info_arguments_are_checked() -> None:
         (("hit", 1, without), "env: expected the key 'table', got dt, .*; give the env of the message hello"),
         (("hit", 1, None), "env: expected a mapping with the key 'robot', got None"),
         (("hit", 1, {**ENV, "table": 3}), r"env\['table'\]: expected a mapping with the key 'length', got 3"),
-        (("hit", 1, {**ENV, "puck": {"radius": "wide"}}), r"env\['puck'\]\['radius'\]: expected a finite number, got 'wide'"),
+        (
+            ("hit", 1, {**ENV, "puck": {"radius": "wide"}}),
+            r"env\['puck'\]\['radius'\]: expected a finite number, got 'wide'",
+        ),
         (("hit", 1, {**ENV, "joint_pos_ids": 6}), r"env\['joint_pos_ids'\]: expected a list of indices, got 6"),
         (("hit", 1, {**ENV, "dt": float("nan")}), r"env\['dt'\]: expected a finite number, got nan"),
         (("hit", 1, {**ENV, "n_agents": 3}), r"env\['n_agents'\]: expected one of 1, 2, got 3"),
@@ -147,7 +150,13 @@ class Saved(AgentBase):
         self.table, self.buffer, self.thing = [1, "x"], np.zeros(4), object()
         self.inner: Any = None
         self._add_save_attr(
-            gain="primitive", weights="numpy", names="pickle", table="json", buffer="numpy!", thing="none", inner="mushroom"
+            gain="primitive",
+            weights="numpy",
+            names="pickle",
+            table="json",
+            buffer="numpy!",
+            thing="none",
+            inner="mushroom",
         )
 
 
@@ -206,7 +215,9 @@ def test_files_that_are_no_agents_are_refused(info: dict[str, Any], tmp_path: Pa
 
 def test_stand_ins_name_what_they_have() -> None:
     robot_model, robot_data = copy.deepcopy(ROBOT)
-    with pytest.raises(StandInError, match="robot_model.opt: expected one of actuator_ctrlrange, jnt_range, nq, nv, because"):
+    with pytest.raises(
+        StandInError, match="robot_model.opt: expected one of actuator_ctrlrange, jnt_range, nq, nv, because"
+    ):
         robot_model.opt
     with pytest.raises(StandInError, match="robot_data.body: expected one of qpos, .*use forward_kinematics"):
         robot_data.body("iiwa_1/link_4")
@@ -254,7 +265,9 @@ DOCUMENT = (REPOSITORY / "docs" / "from-2023.md").read_text()
 
 def test_program_of_the_document_runs() -> None:
     program = DOCUMENT.split("```python\n")[1].split("```")[0]
-    done = subprocess.run([sys.executable, "-c", program], cwd=TEAM, stdin=subprocess.DEVNULL, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=TEAM, stdin=subprocess.DEVNULL, capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stderr
 
 

@@ -38,7 +38,9 @@ class Adapter(Agent):
     @staticmethod
     def load() -> Builder:
         """Returns `build_agent`."""
-        raise OrderError("Adapter: expected a class made by adapt, got Adapter; call adapt(build_agent) and use its result")
+        raise OrderError(
+            "Adapter: expected a class made by adapt, got Adapter; call adapt(build_agent) and use its result"
+        )
 
     def start(self) -> None:
         self.interpolation = interpolation_order(self.config)
@@ -51,8 +53,8 @@ class Adapter(Agent):
         for method in ("draw_action", "reset"):
             if not callable(getattr(self.agent, method, None)):
                 raise ArgumentTypeError(
-                    f"build_agent: expected an agent with {method}, got {type(self.agent).__name__}; derive its class from "
-                    "AgentBase"
+                    f"build_agent: expected an agent with {method}, got {type(self.agent).__name__}; "
+                    "derive its class from AgentBase"
                 )
 
     def reset(self) -> None:
@@ -68,14 +70,14 @@ class Adapter(Agent):
 def adapt(build_agent: Callable[..., Any], config: Mapping[str, Any] | None = None) -> type[Adapter]:
     """A class of agents for `faceoff.agent.run`, from `build_agent` and the content of `agent_config.yml`.
 
-        run(adapt(build_agent, {"interpolation_order": 3}))
+    For example `run(adapt(build_agent, {"interpolation_order": 3}))`.
     """
     builder = checked_builder(build_agent)
     if config is not None and not isinstance(config, Mapping):
         raise ArgumentTypeError(f"config: expected a mapping of settings, got {config!r:.80}")
     settings = dict(config or {})
     interpolation_order(settings)
-    return type("Adapted", (Adapter,), {"load": staticmethod(lambda: builder), "config": settings})
+    return _adapted(lambda: builder, settings)
 
 
 def play(bundle: str | Path) -> None:
@@ -89,9 +91,11 @@ def play(bundle: str | Path) -> None:
             f"bundle: expected a folder made by python -m faceoff.challenge_2023, got {str(bundle)!r}: {error}"
         ) from error
     # The team's code is imported after `run` has moved standard output to the log: an import may print.
-    run(
-        type("Adapted", (Adapter,), {"load": staticmethod(lambda: load_builder(folder / TEAM_FOLDER)), "config": config})
-    )
+    run(_adapted(lambda: load_builder(folder / TEAM_FOLDER), config))
+
+
+def _adapted(load: Callable[[], Builder], config: Mapping[str, Any]) -> type[Adapter]:
+    return type("Adapted", (Adapter,), {"load": staticmethod(load), "config": config})
 
 
 def _checked_action(action: Any, order: int | None) -> Floats:
@@ -105,6 +109,6 @@ def _checked_action(action: Any, order: int | None) -> Floats:
         return numbers[: shape[0]]
     got = f"shape {numbers.shape}" if numbers.size else f"{action!r:.80}"
     raise ArgumentError(
-        f"draw_action: expected an array of shape {shape} for interpolation order {order}, got {got}; return that shape, or "
-        "set interpolation_order in agent_config.yml"
+        f"draw_action: expected an array of shape {shape} for interpolation order {order}, got {got}; "
+        "return that shape, or set interpolation_order in agent_config.yml"
     )

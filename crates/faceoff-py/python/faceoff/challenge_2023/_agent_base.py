@@ -55,8 +55,8 @@ class AgentBase(Savable):
     def draw_action(self, observation: Floats) -> Floats:
         """Called at each control step.
 
-        Returns the action of the shape that `interpolation_order` requires; by default (2, 7): the joints' positions (rad)
-        and velocities (rad/s) at the end of the step.
+        Returns the action of the shape that `interpolation_order` requires; by default (2, 7): the joints' positions
+        (rad) and velocities (rad/s) at the end of the step.
         """
         raise NotImplementedError(f"{type(self).__name__} has no draw_action(self, observation)")
 

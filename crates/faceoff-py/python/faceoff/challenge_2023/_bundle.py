@@ -43,9 +43,7 @@ if __name__ == "__main__":
 _NAME_LENGTH_MAX = 64
 
 
-def make_bundle(
-    folder: str | Path, bundle: str | Path, *, name: str | None = None, runtime: str = RUNTIME
-) -> None:
+def make_bundle(folder: str | Path, bundle: str | Path, *, name: str | None = None, runtime: str = RUNTIME) -> None:
     """Makes the folder `bundle` from a team's folder of 2023.
 
     Args:
@@ -56,13 +54,17 @@ def make_bundle(
 
     The team's files are copied unchanged. Nothing remains of a bundle that could not be completed.
     """
-    source, target = (path_of(key, value, "a folder").absolute() for key, value in (("folder", folder), ("bundle", bundle)))
+    source, target = (
+        path_of(key, value, "a folder").absolute() for key, value in (("folder", folder), ("bundle", bundle))
+    )
     title = _text("name", target.name if name is None else name, _NAME_LENGTH_MAX)
     _text("runtime", runtime, _NAME_LENGTH_MAX)
     package = _find_package(source)
     _check_builder(package / "agent_builder.py")
     if target.exists() or target.is_symlink():
-        raise ArgumentError(f"bundle: expected a new folder, got {str(target)!r}, which exists; choose another name, or remove it")
+        raise ArgumentError(
+            f"bundle: expected a new folder, got {str(target)!r}, which exists; choose another name, or remove it"
+        )
     if target.resolve().is_relative_to(source.resolve()):
         raise ArgumentError(f"bundle: expected a folder outside {str(source)!r}, got {str(target)!r}")
     config = read_config(package / "agent_config.yml")
@@ -100,8 +102,8 @@ def _find_package(folder: Path) -> Path:
         if (package / "agent_builder.py").is_file():
             return package
     raise ArgumentError(
-        f"folder: expected agent_builder.py or {PACKAGE}/agent_builder.py in {str(folder)!r}, got neither; name the folder "
-        "that contains agent_builder.py"
+        f"folder: expected agent_builder.py or {PACKAGE}/agent_builder.py in {str(folder)!r}, got "
+        "neither; name the folder that contains agent_builder.py"
     )
 
 
@@ -115,7 +117,9 @@ def _check_builder(path: Path) -> None:
         match node:
             case ast.FunctionDef(name="build_agent") | ast.Name(id="build_agent", ctx=ast.Store()):
                 return
-            case ast.ImportFrom(names=names) if any((alias.asname or alias.name) in ("build_agent", "*") for alias in names):
+            case ast.ImportFrom(names=names) if any(
+                (alias.asname or alias.name) in ("build_agent", "*") for alias in names
+            ):
                 return
     raise ArgumentError(
         f"{path}: expected a function build_agent(env_info, **kwargs), got a file without it; add the function that "
@@ -146,11 +150,13 @@ def _check_entry(root: Path, path: Path) -> None:
         destination = os.readlink(path)
         if os.path.isabs(destination) or not path.resolve().is_relative_to(root):
             raise ArgumentError(
-                f"folder: expected links within {str(root)!r}, got {str(path)!r}, which leads to {destination!r}; copy the "
-                "file into the folder"
+                f"folder: expected links within {str(root)!r}, got {str(path)!r}, which leads to "
+                f"{destination!r}; copy the file into the folder"
             )
     elif not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
-        raise ArgumentError(f"folder: expected files, folders and links, got {str(path)!r}, which is none of them; remove it")
+        raise ArgumentError(
+            f"folder: expected files, folders and links, got {str(path)!r}, which is none of them; remove it"
+        )
 
 
 def _write_program(folder: Path, name: str, runtime: str, order: int | None) -> None:

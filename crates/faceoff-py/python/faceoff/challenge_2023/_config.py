@@ -81,7 +81,8 @@ def read_config(path: Path) -> dict[str, Any]:
         json.dumps(config, allow_nan=False)
     except (TypeError, ValueError) as error:
         raise ArgumentTypeError(
-            f"{path}: expected numbers, words, lists and keys with values, got {error}; compute other values in build_agent"
+            f"{path}: expected numbers, words, lists and keys with values, got {error}; compute other "
+            "values in build_agent"
         ) from error
     interpolation_order(config)
     return config
@@ -111,8 +112,8 @@ def _parse_lines(path: Path, text: str) -> dict[str, Any]:
             config[key] = _value(value.strip())
         except ValueError:
             raise ArgumentError(
-                f"{path}: line {number}: expected a key and a number, word or one-line list, got {content!r:.80}; install "
-                "PyYAML (pip install pyyaml) for other YAML"
+                f"{path}: line {number}: expected a key and a number, word or one-line list, got "
+                f"{content!r:.80}; install PyYAML (pip install pyyaml) for other YAML"
             ) from None
     return config
 

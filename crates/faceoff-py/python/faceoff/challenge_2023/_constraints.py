@@ -1,6 +1,7 @@
 """`air_hockey_challenge.constraints`: the constraints of the rules as objects; a value above 0 is a violation.
 
-The values are those of `faceoff.kinematics.constraints`; the Jacobians are with respect to joint positions and velocities.
+The values are those of `faceoff.kinematics.constraints`; the Jacobians are with respect to joint positions and
+velocities.
 """
 
 from __future__ import annotations

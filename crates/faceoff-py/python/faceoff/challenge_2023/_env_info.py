@@ -37,8 +37,9 @@ def env_info(task: str, agent_id: int, env: Mapping[str, Any]) -> dict[str, Any]
         agent_id: 1 or 2, the agent's side of the table.
         env: `env` of the message `hello` (docs/protocol.md).
 
-    Lengths in m, angles in rad. `base_frame` always has robot 1 first, because an agent of 2023 takes its robot for number
-    1 on either side: observations are in the own robot's frame, and its opponent's goal is at x > 0 of the table's frame.
+    Lengths in m, angles in rad. `base_frame` always has robot 1 first, because an agent of 2023 takes its robot for
+    number 1 on either side: observations are in the own robot's frame, and its opponent's goal is at x > 0 of the
+    table's frame.
     """
     one_of("task", task, ENV_NAMES)
     one_of("agent_id", agent_id, (1, 2))
@@ -81,10 +82,10 @@ def _robot(agent_id: int, env: Mapping[str, Any]) -> dict[str, Any]:
         robot[key] = array(f"env['robot']['{key}']", entry("env['robot']", received, key), (2, model.JOINTS))
     base_frames = entry("env['robot']", received, "base_frame")
     if not isinstance(base_frames, list) or not base_frames:
-        raise ArgumentTypeError(f"env['robot']['base_frame']: expected a list of 4×4 matrices, got {base_frames!r:.80}")
-    frames = [
-        array(f"env['robot']['base_frame'][{index}]", frame, (4, 4)) for index, frame in enumerate(base_frames)
-    ]
+        raise ArgumentTypeError(
+            f"env['robot']['base_frame']: expected a list of 4×4 matrices, got {base_frames!r:.60}"
+        )
+    frames = [array(f"env['robot']['base_frame'][{index}]", frame, (4, 4)) for index, frame in enumerate(base_frames)]
     # The protocol has the agent's own robot first.
     robot["base_frame"] = frames if agent_id == 1 else frames[::-1]
     robot["robot_model"], robot["robot_data"] = robot_objects()

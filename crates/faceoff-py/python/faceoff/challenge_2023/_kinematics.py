@@ -1,8 +1,8 @@
 """`air_hockey_challenge.utils.kinematics`: the functions of 2023 for one pose, with NumPy instead of MuJoCo.
 
-Points are in the robot's base frame, m; joint positions in rad. The first two arguments are `robot_model` and `robot_data`
-of `env_info`. As in 2023, each call leaves its joint positions in the second one, and `inverse_kinematics` starts from there
-by default.
+Points are in the robot's base frame, m; joint positions in rad. The first two arguments are `robot_model` and
+`robot_data` of `env_info`. As in 2023, each call leaves its joint positions in the second one, and
+`inverse_kinematics` starts from there by default.
 """
 
 from __future__ import annotations
@@ -108,8 +108,8 @@ def inverse_kinematics(
         desired_rotation: of the link, (3, 3); None if only its position matters.
         initial_q: start of the iteration, (7,), rad; None for `mj_data.qpos`.
 
-    Damped least squares within 95 % of the joints' ranges, as in 2023: the result depends on `initial_q`, and may have an
-    elbow or wrist that is too low. `faceoff.kinematics.inverse` avoids both.
+    Damped least squares within 95 % of the joints' ranges, as in 2023: the result depends on `initial_q`, and may
+    have an elbow or wrist that is too low. `faceoff.kinematics.inverse` avoids both.
     """
     check_robot(mj_model, mj_data)
     index = _link(link)

@@ -20,7 +20,8 @@ SUBSTITUTE = Path(__file__).parent / "substitute"
 """The folder with the package `air_hockey_challenge` that replaces the one of 2023."""
 
 _ADVICE = {
-    "air_hockey_challenge": "a bundle has what an agent needs to play (docs/from-2023.md lists it); keep other code in the "
+    "air_hockey_challenge": "a bundle has what an agent needs to play (docs/from-2023.md lists it); keep "
+    "other code in the "
     f"package {PACKAGE}",
     "baseline": "convert the folder above, which contains both baseline and air_hockey_agent",
     "mujoco": "use air_hockey_challenge.utils.kinematics, or bring MuJoCo in a container image",
@@ -34,8 +35,8 @@ def install_substitute() -> None:
     loaded = sys.modules.get("air_hockey_challenge")
     if loaded is not None and not _is_below(getattr(loaded, "__file__", None), SUBSTITUTE):
         raise OrderError(
-            f"air_hockey_challenge: expected that it is not imported yet, got {getattr(loaded, '__file__', None)}; load the "
-            "agent in a process of its own"
+            "air_hockey_challenge: expected that it is not imported yet, got "
+            f"{getattr(loaded, '__file__', None)}; load the agent in a process of its own"
         )
     _search_first(SUBSTITUTE)
 

@@ -15,7 +15,8 @@ from faceoff.kinematics import model
 def robot_objects() -> tuple[Any, Any]:
     """`MjModel` and `MjData` of the arm without the mallet, its base at the origin; without MuJoCo their stand-ins.
 
-    Names are those of 2023: bodies `iiwa_1/base`, `iiwa_1/link_1` … and `iiwa_1/striker_joint_link`, joints `iiwa_1/joint_1` ….
+    Names are those of 2023: bodies `iiwa_1/base`, `iiwa_1/link_1` … and `iiwa_1/striker_joint_link`, joints
+    `iiwa_1/joint_1` ….
     """
     try:
         import mujoco
@@ -34,7 +35,8 @@ def check_robot(mj_model: Any, mj_data: Any) -> None:
         # By the name of the class: MuJoCo may not be installed.
         if not isinstance(value, stand_in) and type(value).__name__ != kind:
             raise ArgumentTypeError(
-                f"{name}: expected env_info['robot']['{key}'], got {type(value).__name__}; give robot_model and robot_data"
+                f"{name}: expected env_info['robot']['{key}'], got {type(value).__name__}; give "
+                "robot_model and robot_data"
             )
 
 
@@ -74,9 +76,7 @@ def _mjcf() -> str:
         )
         motors += _element("motor", name=name, joint=name, ctrlrange=(-torque, torque), end="/")
     inertia = model.END_EFFECTOR_INERTIA_KG_M2
-    bodies += _element(
-        "body", name="iiwa_1/striker_joint_link", pos=(0, 0, model.END_EFFECTOR_Z_M)
-    ) + _element(
+    bodies += _element("body", name="iiwa_1/striker_joint_link", pos=(0, 0, model.END_EFFECTOR_Z_M)) + _element(
         "inertial", pos=(0, 0, 0), mass=model.END_EFFECTOR_MASS_KG, diaginertia=(inertia,) * 3, end="/"
     )
     compiler = _element("compiler", angle="radian", autolimits="true", end="/")

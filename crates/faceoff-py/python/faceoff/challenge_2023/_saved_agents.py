@@ -1,8 +1,8 @@
 """Agents in the files of MushroomRL (`save`, `load`): a ZIP file with one entry per attribute.
 
-A class lists its attributes with the way in which each is saved: `primitive` and `pickle` (pickle), `numpy`, `json`, `torch`,
-`mushroom` (an object of the same kind, in a folder of the file), or `none` (not saved, and None after loading). A `!` at the
-end saves an attribute only on request.
+A class lists its attributes with the way in which each is saved: `primitive` and `pickle` (pickle), `numpy`, `json`,
+`torch`, `mushroom` (an object of the same kind, in a folder of the file), or `none` (not saved, and None after
+loading). A `!` at the end saves an attribute only on request.
 """
 
 from __future__ import annotations

@@ -80,9 +80,7 @@ class Box:
 class MDPInfo:
     """``env_info["rl_info"]``: spaces, discount and horizon as MushroomRL describes them."""
 
-    def __init__(
-        self, observation_space: Box, action_space: Box, gamma: float, horizon: int, dt: float = 0.1
-    ) -> None:
+    def __init__(self, observation_space: Box, action_space: Box, gamma: float, horizon: int, dt: float = 0.1) -> None:
         self.observation_space = observation_space
         #: Torques of all robots on the table, ± N m: the space of the simulator of 2023, not that of `draw_action`.
         self.action_space = action_space

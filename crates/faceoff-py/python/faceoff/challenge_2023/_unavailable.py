@@ -13,7 +13,8 @@ from faceoff.errors import MissingError
 def missing(name: str, advice: str) -> MissingError:
     """The error for a part of the package of 2023 that a bundle does not have."""
     return MissingError(
-        f"{name}: expected a part of air_hockey_challenge that plays, got one that simulates, trains or evaluates; {advice}"
+        f"{name}: expected a part of air_hockey_challenge that plays, got one that simulates, trains or "
+        f"evaluates; {advice}"
     )
 
 
