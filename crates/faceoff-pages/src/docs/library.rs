@@ -81,6 +81,10 @@ static SOURCES: LazyLock<[(&str, Vec<Source>); 4]> = LazyLock::new(|| {
                     "Training environments, games, evaluation and kinematics in Python."
                 ),
                 source!(
+                    "from-2023",
+                    "Agents written for air_hockey_challenge: old and new names, and a converter."
+                ),
+                source!(
                     "tuning",
                     "How to find out whether a change of an agent is an improvement."
                 ),

@@ -8,6 +8,7 @@ Importing this package is cheap: the simulator and other packages are imported o
 - :mod:`faceoff.game`: the game of two robots, for PettingZoo and self-play.
 - :mod:`faceoff.sb3`: the vector environment as Stable-Baselines3 expects it.
 - :mod:`faceoff.dataset`: recorded episodes.
+- :mod:`faceoff.challenge_2023`: agents that were written for the 2023 challenge.
 - :func:`faceoff.evaluate`: the competition's evaluator with a policy in this process.
 """
 

@@ -1,0 +1,3 @@
+from faceoff.challenge_2023._unavailable import AirHockeyChallengeWrapper
+
+__all__ = ["AirHockeyChallengeWrapper"]
