@@ -46,11 +46,13 @@ def test_python_blocks_run(beside_recordings: Path) -> None:
 
 def test_shell_commands_run(beside_recordings: Path) -> None:
     pytest.importorskip("minari")
-    (commands,) = (block for block in blocks("sh") if "faceoff.dataset" in block)
-    for line in commands.splitlines():
+    commands = [line for block in blocks("sh") for line in block.splitlines() if "faceoff.dataset" in line]
+    assert len(commands) == 4
+    for line in commands:
         program, *arguments = shlex.split(line)
         assert program == "python"
         subprocess.run([sys.executable, *arguments], check=True)
+    assert (beside_recordings / "plain" / "steps.parquet").exists()
     assert (beside_recordings / "lerobot-2" / "prepare" / "meta" / "info.json").exists()
 
 

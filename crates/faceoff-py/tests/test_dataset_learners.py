@@ -6,6 +6,9 @@ LeRobot itself opens them in `tests_learning/test_lerobot.py`: it needs torch.
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +19,7 @@ pytest.importorskip("pyarrow")
 
 import faceoff.dataset as fd  # noqa: E402
 import pyarrow.parquet as pq  # noqa: E402
-from dataset_recordings import FIXTURES, odd  # noqa: E402
+from dataset_recordings import FIXTURES, hold, odd  # noqa: E402
 
 STRIKER = FIXTURES / "dataset-layout-2.zip"
 HOLD = FIXTURES / "dataset-layout-3.zip"
@@ -60,6 +63,33 @@ def test_minari_loads_every_episode(
         assert read.observation_space.contains(exported.observations[0])
         assert read.action_space.contains(exported.actions[0])
     assert read.storage.metadata["algorithm_name"] == "striker"
+
+
+def test_minari_recovers_the_environment_of_the_dataset(tmp_path: Path) -> None:
+    """In a process that has not imported the package, as after a download."""
+    pytest.importorskip("minari")
+    dataset = fd.open_dataset(hold())
+    fd.to_minari(dataset, "faceoff/defend/hold-v0", root=tmp_path)
+    program = """
+import json, minari
+dataset = minari.load_dataset("faceoff/defend/hold-v0")
+env = dataset.recover_environment()
+observation, _ = env.reset(seed=1)
+episode = next(dataset.iterate_episodes())
+env.step(episode.actions[0])
+assert observation.shape == episode.observations[0].shape
+print(json.dumps(env.spec.kwargs))
+"""
+    environment = {**os.environ, "MINARI_DATASETS_PATH": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout) == {
+        "task": "defend",
+        "action_mode": "raw",
+        "interpolation": 3,
+        "profile": dataset.profile,
+        "mismatch_seed": dataset.mismatch_seed,
+    }
 
 
 def test_minari_export_accepts_reward_dtype_and_folder(tmp_path: Path) -> None:

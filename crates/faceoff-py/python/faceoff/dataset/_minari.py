@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import copy
+import json
 import os
 import warnings
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Iterable, Iterator
+from typing import Any, Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -44,7 +46,8 @@ def to_minari(
     opponent (N + 1, 23), and (N, 7), (N, 14), (N, 21) or (N, 420) by the interpolation. An episode that
     ends at the horizon or by an agent fault is truncated, any other is terminated. `infos` has
     `computation_time_s`, `constraints` and `puck` (true, after the step), one per observation; the
-    first is NaN. The metadata of each episode has its `seed_hex`, `end`, `success` and number. Episodes
+    first is NaN. `recover_environment()` returns the environment with the perturbations and the robot of the dataset,
+    in which recorded actions can be played. The metadata of each episode has its `seed_hex`, `end`, `success` and number. Episodes
     without an answered step are left out.
 
     Args:
@@ -84,6 +87,7 @@ def to_minari(
     buffers = [_buffer(EpisodeBuffer, episode, reward, scalar) for episode in selection.episodes]
     observation_len = buffers[0].observations.shape[1]
     metadata = {
+        "env": _environment(dataset, selection.task, selection.episodes),
         "algorithm_name": dataset.agent,
         "description": f"Agent {dataset.agent} in {selection.task}, profile {dataset.profile}, "
         f"ruleset {dataset.ruleset}",
@@ -113,6 +117,28 @@ def to_minari(
             ]
         )
     return exported
+
+
+def _environment(dataset: Dataset, task: str, episodes: Sequence[Episode]) -> Any:
+    """The specification of an environment that takes the recorded actions, None if there is no single one."""
+    import gymnasium
+
+    import faceoff.gym  # noqa: F401 - registers the environments
+    from faceoff._arguments import PROFILES
+
+    codes = {json.loads(episode.interpolation) for episode in episodes if episode.interpolation is not None}
+    if len(codes) != 1 or dataset.profile not in PROFILES:
+        return None
+    spec = copy.deepcopy(gymnasium.spec(f"faceoff/AirHockey-{task.capitalize()}-v0"))
+    spec.kwargs |= {
+        "action_mode": "raw",
+        "interpolation": codes.pop(),
+        "profile": dataset.profile,
+        "mismatch_seed": dataset.mismatch_seed,
+    }
+    if "perturbations" in dataset.manifest:
+        spec.kwargs["perturbations"] = dataset.manifest["perturbations"]
+    return spec
 
 
 def _find_task(dataset: Dataset, dataset_id: str, task: str | None) -> str:
