@@ -68,7 +68,8 @@ case ${1:-} in
             "$target/python-version/bin/python" -VV
             "$target/python-version/bin/python" -m pytest --quiet -p no:cacheprovider --rootdir "$here" \
                 "$here/tests/test_gym_env.py" "$here/tests/test_gym_vector.py" "$here/tests/test_game.py" \
-                "$here/tests/test_bad_input.py" "$here/tests/test_processes.py"
+                "$here/tests/test_bad_input.py" "$here/tests/test_processes.py" "$here/tests/test_game_vector.py" \
+                "$here/tests/test_sb3.py" "$here/tests/test_gym_mallet.py" "$here/tests/test_kinematics_native.py"
         done
         ;;
     *)

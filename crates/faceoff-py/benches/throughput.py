@@ -1,9 +1,9 @@
 """Control steps per second of the Python environments, compared with the simulator's batch.
 
-    python crates/faceoff-py/benches/throughput.py [--worlds 256] [--threads 2] [--seconds 3] [--task prepare]
+    python crates/faceoff-py/benches/throughput.py [--worlds 256] [--threads 2] [--seconds 3] [--task prepare] [--games 128]
 
-Arms hold still (actions of 0). A control step is 20 physics steps. Measurements alternate, so that a busy machine
-affects all alike; prints the median over the rounds.
+Arms hold still (actions of 0). A control step is 20 physics steps; one of a game moves two arms. Measurements alternate, so
+that a busy machine affects all alike; prints medians over the rounds, per second and per second of CPU time.
 """
 
 from __future__ import annotations
@@ -16,9 +16,11 @@ from collections.abc import Callable
 import numpy as np
 
 from faceoff import _native
+from faceoff.game import AirHockeyGameVectorEnv
 from faceoff.gym import AirHockeyEnv, AirHockeyVectorEnv
 
 ROUNDS = 7
+BATCH = "the simulator's batch, Rust"
 
 
 def main() -> None:
@@ -28,29 +30,30 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--seconds", type=float, default=3.0)
     parser.add_argument("--task", default="prepare")
+    parser.add_argument("--games", type=int, default=128)
     options = parser.parse_args()
     rows = {
         "one world, Python": (1, step_one(options.task)),
         "vector environment, copy": (options.worlds, step_many(options, copy=True)),
         "vector environment, no copy": (options.worlds, step_many(options, copy=False)),
         "vector environment, send/recv": (options.worlds, send_and_receive(options)),
-        "the simulator's batch, Rust": (options.worlds, step_batch(options)),
+        BATCH: (options.worlds, step_batch(options)),
+        "games, both sides": (options.games, step_games(options)),
     }
     round_s = options.seconds / ROUNDS
-    rates: dict[str, list[float]] = {name: [] for name in rows}
+    rates: dict[str, list[tuple[float, float]]] = {name: [] for name in rows}
     for _ in range(ROUNDS):
         for name, (worlds, step) in rows.items():
-            count, started_s = 0, time.perf_counter()
+            count, started_s, started_cpu_s = 0, time.perf_counter(), time.process_time()
             while (elapsed_s := time.perf_counter() - started_s) < round_s:
                 step()
                 count += worlds
-            rates[name].append(count / elapsed_s)
-    batch_rate = statistics.median(rates["the simulator's batch, Rust"])
-    for name, measured in rates.items():
-        rate = statistics.median(measured)
+            rates[name].append((count / elapsed_s, count / (time.process_time() - started_cpu_s)))
+    medians = {name: [statistics.median(kind) for kind in zip(*measured, strict=True)] for name, measured in rates.items()}
+    for name, (rate, cpu_rate) in medians.items():
         print(
             f"{name:32} {rate:>10,.0f} control steps/s {20 * rate:>12,.0f} physics steps/s "
-            f"{rate / batch_rate:6.1%} of the batch"
+            f"{cpu_rate:>10,.0f} per CPU second {cpu_rate / medians[BATCH][1]:6.1%} of the batch"
         )
 
 
@@ -92,6 +95,14 @@ def send_and_receive(options: argparse.Namespace) -> Callable[[], object]:
         envs.recv()
 
     return step
+
+
+def step_games(options: argparse.Namespace) -> Callable[[], object]:
+    """A function that steps many games of two robots."""
+    games = AirHockeyGameVectorEnv(options.games, threads=options.threads, copy=False, autoreset_mode="SameStep")
+    games.reset(seed=0)
+    zeros = np.zeros((2 * options.games, 7))
+    return lambda: games.step(zeros)
 
 
 def step_batch(options: argparse.Namespace) -> Callable[[], object]:

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import supersuit
 from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import RecordEpisodeStatistics
 from commands import runaway_action
@@ -183,6 +182,7 @@ def test_random_side_is_drawn_per_game() -> None:
 
 
 def test_supersuit_makes_a_vector_environment_of_both_robots() -> None:
+    supersuit = pytest.importorskip("supersuit")
     envs = supersuit.pettingzoo_env_to_vec_env_v1(AirHockeyGame(max_steps=20))
     observations, _ = envs.reset(seed=3)
     assert observations.shape == (2, 23)
@@ -194,6 +194,7 @@ def test_supersuit_makes_a_vector_environment_of_both_robots() -> None:
 
 @pytest.mark.parametrize("processes", [1, 2])
 def test_supersuit_joins_games_in_processes(processes: int) -> None:
+    supersuit = pytest.importorskip("supersuit")
     envs = supersuit.pettingzoo_env_to_vec_env_v1(AirHockeyGame(max_steps=20))
     envs = supersuit.concat_vec_envs_v1(envs, 4, num_cpus=processes, base_class="gymnasium")
     observations, _ = envs.reset(seed=3)

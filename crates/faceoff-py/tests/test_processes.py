@@ -90,7 +90,8 @@ def test_step_sent_by_the_parent_is_refused_in_the_child() -> None:
 
 
 def test_async_vector_env_runs_the_environment() -> None:
-    make = lambda: gymnasium.make("faceoff/AirHockey-Defend-v0")  # noqa: E731
+    # From Python 3.14 on, a worker has not imported `faceoff.gym` by default.
+    make = lambda: gymnasium.make("faceoff.gym:faceoff/AirHockey-Defend-v0")  # noqa: E731
     envs: Any = AsyncVectorEnv([make] * 2)
     envs.reset(seed=0)
     observations = step_five_times(envs)
