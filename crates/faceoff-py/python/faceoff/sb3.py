@@ -121,7 +121,7 @@ class VecEnvMethods:
             raise ArgumentError(
                 f"env_method: expected render, since worlds have no other method of their own, got {method_name!r}"
             )
-        frames = self.envs.render()
+        frames = self._worlds.render()
         return [frames[index] for index in self._indices(indices)]
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
@@ -130,7 +130,7 @@ class VecEnvMethods:
 
     def get_images(self) -> Sequence[npt.NDArray[np.uint8] | None]:
         """A picture of each world, for ``rgb_array``."""
-        return self.envs.render() if self.render_mode == "rgb_array" else [None] * self.num_envs
+        return self._worlds.render() if self.render_mode == "rgb_array" else [None] * self.num_envs
 
     def _indices(self, indices: None | int | Iterable[int]) -> list[int]:
         if indices is None:

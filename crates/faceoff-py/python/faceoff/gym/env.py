@@ -80,6 +80,8 @@ class AirHockeyEnv(gymnasium.Env[Any, Any]):
             raise ArgumentTypeError(f"reward: expected a function of a Transition, got {reward!r}")
         self.task = task
         self.action_mode = action_mode
+        self.interpolation = interpolation
+        self.clip_actions = bool(clip_actions)
         self.render_mode = render_mode
         self.observation_space = observation_space(task)
         self.action_space = action_space(interpolation, action_mode)

@@ -99,6 +99,8 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
         self._threads = integer("threads", threads, 1, 1024)
         self.task = task
         self.action_mode = action_mode
+        self.interpolation = interpolation
+        self.clip_actions = bool(clip_actions)
         self.copy = bool(copy)
         self.render_mode = render_mode
         self.metadata = {**AirHockeyEnv.metadata, "render_modes": ["rgb_array"]}
