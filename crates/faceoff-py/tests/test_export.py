@@ -78,11 +78,12 @@ def test_models_are_accepted_as_object_and_as_path(tmp_path: Path) -> None:
 def wrapped(env: Any) -> Any:
     """An environment with each wrapper that can be exported, after some steps."""
     env = wrappers.RecordEpisodeStatistics(env)
-    env = wrappers.RescaleAction(wrappers.ClipAction(wrappers.FlattenObservation(env)), -3.0, 2.0)
+    env = wrappers.ClipAction(wrappers.RescaleAction(wrappers.FlattenObservation(env), -3.0, 2.0))
     env = wrappers.NormalizeReward(wrappers.NormalizeObservation(env))
     env.reset(seed=0)
+    draws = np.random.default_rng(0)
     for _ in range(100):
-        *_, terminated, truncated, _ = env.step(env.action_space.sample())
+        *_, terminated, truncated, _ = env.step(draws.normal(0.0, 2.0, 7).astype(np.float32))
         if terminated or truncated:
             env.reset()
     return env
@@ -91,15 +92,15 @@ def wrapped(env: Any) -> Any:
 def test_wrappers_are_part_of_the_graph(tmp_path: Path) -> None:
     """The wrappers themselves give the expected action."""
     env = wrapped(gymnasium.make("faceoff/AirHockey-Defend-v0"))
-    model = linear_policy(20, 7, scale=0.5)
+    model = linear_policy(20, 7, scale=0.5, bounded=False)
     exported = graph_of(faceoff.export(model, tmp_path / "agent", env=env))
     normaliser = env.env
     normaliser.update_running_mean = False
-    rescale = normaliser.env
+    clip = normaliser.env
     act = function_of(model)
     for observation in observations(AirHockeyEnv()).astype(np.float32):
         action = act(normaliser.observation(observation))
-        expected = rescale.env.action(rescale.action(action))
+        expected = clip.env.action(clip.action(action))
         np.testing.assert_allclose(exported(observation), expected, atol=1e-5)
 
 
