@@ -133,6 +133,24 @@ def test_mallet_policy_scores_like_its_predict(tmp_path: Path) -> None:
     assert (other / "agent.py").read_bytes() == (folder / "agent.py").read_bytes()
 
 
+def test_stacked_observations_are_kept_by_the_agent(tmp_path: Path) -> None:
+    envs = VecNormalize(VecFrameStack(faceoff.sb3.make_vec_env("defend", 4, seed=0, clip_actions=True), 3))
+    model = PPO("MlpPolicy", envs, n_steps=64, seed=0, device="cpu")
+    model.learn(512)
+    folder = faceoff.export(model, tmp_path / "agent")
+
+    class Stacking(Policy):
+        def reset(self, task: str, episode: int) -> None:
+            self.frames = np.zeros((3, 20), np.float32)
+
+        def __call__(self, observation: Any) -> Any:
+            self.frames = np.roll(self.frames, -1, axis=0)
+            self.frames[-1] = environment_observation(observation)
+            return np.asarray(self.act(self.frames.reshape(-1)), np.float64)
+
+    assert_same_score(folder, Stacking(sb3_action(model)), "defend", tmp_path, clip_actions=True)
+
+
 def test_algorithm_scales_actions_to_the_raw_space(tmp_path: Path) -> None:
     """A squashed action becomes rad within the joints' limits."""
     env = gymnasium.make("faceoff/AirHockey-Prepare-v0", action_mode="raw", interpolation=2)
@@ -180,8 +198,8 @@ class Returning(nn.Module):
         return self.output
 
 
-def stacked() -> Any:
-    return PPO("MlpPolicy", VecFrameStack(faceoff.sb3.make_vec_env("defend", 2), 4), device="cpu")
+def stacked_normalised() -> Any:
+    return PPO("MlpPolicy", VecFrameStack(VecNormalize(faceoff.sb3.make_vec_env("defend", 2)), 4), device="cpu")
 
 
 def in_processes() -> Any:
@@ -189,7 +207,7 @@ def in_processes() -> Any:
 
 
 REFUSED: list[tuple[Callable[[], dict[str, Any]], str]] = [
-    (lambda: {"policy": stacked()}, "env: expected wrappers that can be exported, got VecFrameStack"),
+    (lambda: {"policy": stacked_normalised()}, "env: expected no VecNormalize below VecFrameStack: put it above"),
     (lambda: {"policy": nn.Linear(23, 7), "task": "defend"}, r"expected a module that accepts observations of shape \(1, 20\)"),
     (lambda: {"policy": nn.Linear(20, 7)}, "env: expected the environment of the training, or task="),
     (lambda: {"policy": nn.Linear(20, 6), "env": AirHockeyEnv(clip_actions=True)}, r"expected actions of shape \(200, 7\)"),

@@ -81,6 +81,10 @@ static SOURCES: LazyLock<[(&str, Vec<Source>); 4]> = LazyLock::new(|| {
                     "Training environments, games, evaluation and kinematics in Python."
                 ),
                 source!(
+                    "from-sb3",
+                    "Train with Stable-Baselines3, export the policy as an agent, and submit it."
+                ),
+                source!(
                     "tuning",
                     "How to find out whether a change of an agent is an improvement."
                 ),

@@ -19,6 +19,7 @@ ACTION_MODE: str = "delta"
 INTERPOLATION: int | None = 1
 CLIP_ACTIONS: bool = False
 MALLET_SPEED_M_S: float | None = None
+FRAMES: int = 1
 
 
 class Exported(Agent):
@@ -43,13 +44,19 @@ class Exported(Agent):
 
     def reset(self) -> None:
         self.actions.restart()
+        # The policy's input: the last observations, the newest at the end; zeros before the first one.
+        self.frames: list[float] | None = None
         if self.motion is not None:
             self.motion.restart(np.ones(1, np.bool_))
 
     def act(self, observation: list[float]) -> Any:
         if self.task != TASK:
             return self.hold
-        inputs = np.array([environment_observation(observation)], np.float32)
+        newest = environment_observation(observation)
+        if self.frames is None:
+            self.frames = [0.0] * (FRAMES * len(newest))
+        self.frames = [*self.frames[len(newest) :], *newest]
+        inputs = np.array([self.frames], np.float32)
         [action] = self.session.run(["action"], {"observation": inputs})[0].astype(np.float64)
         if self.motion is not None:
             action = self.motion.command(action[None])[0]

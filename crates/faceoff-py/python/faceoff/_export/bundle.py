@@ -95,6 +95,7 @@ def _agent(environment: PolicyEnvironment) -> str:
         "INTERPOLATION": environment.interpolation,
         "CLIP_ACTIONS": environment.clip_actions,
         "MALLET_SPEED_M_S": environment.mallet_speed_m_s,
+        "FRAMES": environment.frames,
     }
     for constant, value in values.items():
         line = re.compile(rf"^({constant}: [^=]+= ).*$", re.MULTILINE)

@@ -59,11 +59,13 @@ class PolicyEnvironment:
     """From the world's observation to the policy's."""
     action_steps: list[Step] = field(default_factory=list)
     """From the policy's action to the world's."""
+    frames: int = 1
+    """Number of the last observations that the policy gets, the newest at the end; zeros before the first one."""
 
     @property
     def observation_len(self) -> int:
-        """Count of numbers in an observation."""
-        return int(self.observation_space.shape[0])
+        """Count of numbers in the policy's input."""
+        return self.frames * int(self.observation_space.shape[0])
 
     @property
     def action_len(self) -> int:
@@ -76,6 +78,18 @@ class PolicyEnvironment:
         if self.clip_actions or self.mallet_speed_m_s is not None:
             return None
         return 1e4 if self.action_mode == "raw" else 1.0
+
+
+@dataclass
+class Layer:
+    """What a wrapper does."""
+
+    inner: Any
+    """The environment that it wraps."""
+    observation_steps: list[Step] = field(default_factory=list)
+    action_steps: list[Step] = field(default_factory=list)
+    frames: int = 1
+    """Number of observations that it stacks."""
 
 
 def default_environment(task: object) -> PolicyEnvironment:
@@ -94,16 +108,21 @@ def read_environment(env: Any, task: object = None) -> PolicyEnvironment:
     observation_steps: list[Step] = []
     action_steps: list[Step] = []
     mallet: MalletPlane | MalletPlaneVector | None = None
+    frames, stack = 1, ""
     layer = env
     while not isinstance(layer, (AirHockeyEnv, AirHockeyVectorEnv)):
-        for_observations, for_actions, inner = _read_layer(layer)
+        read = _read_layer(layer)
         if isinstance(layer, (MalletPlane, MalletPlaneVector)):
             mallet = layer
-        elif for_actions and mallet is not None:
+        elif read.action_steps and mallet is not None:
             raise ArgumentError(f"env: expected no {_name(layer)} below {_name(mallet)}: put it above, or leave it out")
-        observation_steps = [*for_observations, *observation_steps]
-        action_steps += for_actions
-        layer = inner
+        if stack and (read.observation_steps or read.frames > 1):
+            raise ArgumentError(f"env: expected no {_name(layer)} below {stack}: put it above, or leave it out")
+        if read.frames > 1:
+            frames, stack = read.frames, _name(layer)
+        observation_steps = [*read.observation_steps, *observation_steps]
+        action_steps += read.action_steps
+        layer = read.inner
     own = AirHockeyEnv if isinstance(layer, AirHockeyEnv) else AirHockeyVectorEnv
     if type(layer).step is not own.step or type(layer).reset is not own.reset:
         raise ArgumentError(f"env: expected an {own.__name__}, got {_name(layer)} with a step or reset of its own: {CURE}")
@@ -119,11 +138,12 @@ def read_environment(env: Any, task: object = None) -> PolicyEnvironment:
         mallet_speed_m_s=None if mallet is None else mallet.max_speed_m_s,
         observation_steps=observation_steps,
         action_steps=action_steps,
+        frames=frames,
     )
 
 
-def _read_layer(env: Any) -> tuple[list[Step], list[Step], Any]:
-    """A wrapper's steps for observations and for actions, and the environment that it wraps."""
+def _read_layer(env: Any) -> Layer:
+    """What a wrapper or a vector environment does."""
     if "stable_baselines3" in sys.modules:
         from faceoff._export.stable_baselines3 import read_vec_env_layer
 
@@ -131,9 +151,9 @@ def _read_layer(env: Any) -> tuple[list[Step], list[Step], Any]:
         if read is not None:
             return read
     if isinstance(env, VecEnvMethods):
-        return [], [], env.envs
+        return Layer(env.envs)
     if isinstance(env, SyncVectorEnv):
-        return [], [], env.envs[0]
+        return Layer(env.envs[0])
     if isinstance(env, AsyncVectorEnv):
         raise ArgumentError(f"env: expected worlds in this process, got an AsyncVectorEnv: {SUBPROCESSES}")
     if not isinstance(env, (gymnasium.Wrapper, gymnasium.vector.VectorWrapper)):
@@ -141,18 +161,18 @@ def _read_layer(env: Any) -> tuple[list[Step], list[Step], Any]:
             f"env: expected an environment of faceoff.gym or faceoff.sb3, with or without wrappers, got {env!r:.80}"
         )
     if isinstance(env, (MalletPlane, MalletPlaneVector)) or is_transparent(env):
-        return [], [], env.env
+        return Layer(env.env)
     if _is_one_of(env, "NormalizeObservation"):
         statistics: Any = env
         rms = statistics.obs_rms
-        return normalise(rms.mean, rms.var, statistics.epsilon, None), [], env.env
+        return Layer(env.env, normalise(rms.mean, rms.var, statistics.epsilon, None))
     if _is_one_of(env, "FlattenObservation") and len(_single_space(env.env, "observation_space").shape) == 1:
-        return [], [], env.env
+        return Layer(env.env)
     inner = _single_space(env.env, "action_space")
     if _is_one_of(env, "ClipAction"):
-        return [], clip(inner.low, inner.high), env.env
+        return Layer(env.env, action_steps=clip(inner.low, inner.high))
     if _is_one_of(env, "RescaleAction"):
-        return [], _rescale(_single_space(env, "action_space"), inner), env.env
+        return Layer(env.env, action_steps=_rescale(_single_space(env, "action_space"), inner))
     if _is_one_of(env, "TransformObservation") or _is_one_of(env, "TransformAction"):
         raise ArgumentError(f"env: expected wrappers that can be read, got {_name(env)} with a function: {CURE}")
     raise ArgumentError(f"env: expected wrappers that can be exported, got {_name(env)}: {CURE}")

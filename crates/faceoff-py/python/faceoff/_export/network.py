@@ -145,9 +145,10 @@ def check_graph(model: Any, network: PolicyNetwork, environment: PolicyEnvironme
 def sample_observations(environment: PolicyEnvironment) -> Array:
     """(SAMPLES, observation length), float32: from the whole space, and closer to its centre, where play happens."""
     space = environment.observation_space
+    low, high = (np.tile(bound.astype(np.float64), environment.frames) for bound in (space.low, space.high))
     draws = np.random.default_rng(0).uniform(0.0, 1.0, (SAMPLES, environment.observation_len))
     draws[SAMPLES // 2 :] = 0.5 + 0.1 * (draws[SAMPLES // 2 :] - 0.5)
-    observations: Array = (space.low + draws * (space.high.astype(np.float64) - space.low)).astype(np.float32)
+    observations: Array = (low + draws * (high - low)).astype(np.float32)
     return observations
 
 

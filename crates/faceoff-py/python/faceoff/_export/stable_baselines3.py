@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from gymnasium.spaces import Box
 
-from faceoff._export.environment import CURE, SUBPROCESSES, is_transparent
+from faceoff._export.environment import CURE, SUBPROCESSES, Layer, is_transparent
 from faceoff._export.network import PolicyNetwork
-from faceoff._export.steps import Array, Step, clip, normalise, unscale
+from faceoff._export.steps import Array, clip, normalise, unscale
 from faceoff._export.torch_modules import trace
 from faceoff.errors import ArgumentError
 from faceoff.sb3 import VecEnvMethods
@@ -74,23 +74,33 @@ def read_network(algorithm: Any, observation_len: int) -> PolicyNetwork:
     return PolicyNetwork(trace(Deterministic(), observation_len), predict, steps)
 
 
-def read_vec_env_layer(env: Any) -> tuple[list[Step], list[Step], Any] | None:
-    """What `_read_layer` returns, for a vector environment of Stable-Baselines3; None for another object, and for Faceoff's own."""
-    from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecEnv, VecEnvWrapper, VecNormalize
+def read_vec_env_layer(env: Any) -> Layer | None:
+    """What a vector environment of Stable-Baselines3 does; None for another object, and for Faceoff's own."""
+    from stable_baselines3.common.vec_env import (
+        DummyVecEnv,
+        SubprocVecEnv,
+        VecEnv,
+        VecEnvWrapper,
+        VecFrameStack,
+        VecNormalize,
+    )
 
     if isinstance(env, VecEnvMethods) or not isinstance(env, VecEnv):
         return None
     if isinstance(env, VecNormalize):
         if not env.norm_obs:
-            return [], [], env.venv
+            return Layer(env.venv)
         rms: Any = env.obs_rms
         if not isinstance(getattr(rms, "mean", None), np.ndarray):
             raise ArgumentError(f"env: expected VecNormalize with statistics of one array, got {rms!r:.80}")
-        return normalise(rms.mean, rms.var, env.epsilon, env.clip_obs), [], env.venv
+        return Layer(env.venv, normalise(rms.mean, rms.var, env.epsilon, env.clip_obs))
+    if isinstance(env, VecFrameStack):
+        stacked: Any = env.stacked_obs
+        return Layer(env.venv, frames=int(stacked.n_stack))
     if isinstance(env, DummyVecEnv):
-        return [], [], env.envs[0]
+        return Layer(env.envs[0])
     if isinstance(env, SubprocVecEnv):
         raise ArgumentError(f"env: expected worlds in this process, got a SubprocVecEnv: {SUBPROCESSES}")
     if isinstance(env, VecEnvWrapper) and is_transparent(env):
-        return [], [], env.venv
+        return Layer(env.venv)
     raise ArgumentError(f"env: expected wrappers that can be exported, got {type(env).__name__}: {CURE}")
