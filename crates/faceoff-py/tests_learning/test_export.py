@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import os
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -19,18 +15,14 @@ import onnxruntime
 import pytest
 import stable_baselines3
 import torch
-from faceoff.actions import environment_observation
 from faceoff.gym import AirHockeyEnv, AirHockeyVectorEnv, MalletPlane
-from faceoff.kinematics import MalletMotion, native
 from gymnasium import wrappers
+from policies import Policy, played, sb3_action
 from stable_baselines3 import A2C, DDPG, DQN, PPO, SAC, TD3
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecFrameStack, VecMonitor, VecNormalize
 from torch import nn
 
-ROOT = Path(__file__).resolve().parents[3]
-TARGET = Path(os.environ.get("TARGET_DIR", ROOT / "target"))
-PROGRAM = Path(os.environ.get("FACEOFF_BIN", TARGET / "release" / "faceoff"))
 MALLET_SPEED_M_S = 1.5
 
 
@@ -49,47 +41,6 @@ def seen_observations(task: str, count: int = 200) -> Any:
         observation, _, terminated, truncated, _ = env.step(draws.uniform(-0.3, 0.3, 7))
         rows.append(env.reset()[0] if terminated or truncated else observation)
     return np.array(rows)
-
-
-def played(folder: Path, task: str, episodes: int, scratch: Path) -> dict[str, Any]:
-    """The result of the agent in `faceoff eval`, with time limits that no machine reaches."""
-    config = scratch / "faceoff.toml"
-    limits = (ROOT / "tests" / "long_time_limits.toml").read_text()
-    config.write_text(f'{limits}[runtimes.python3-ml]\nfolder = "{sys.prefix}"\n')
-    command = [PROGRAM, "eval", folder, "--task", task, "--episodes", str(episodes), "--json", "--config", config]
-    done = subprocess.run([*command, "--out", scratch / "result"], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr + done.stdout
-    answer = json.loads(done.stdout)
-    assert answer["faults"] == []
-    result: dict[str, Any] = answer["result"]["tasks"][task]
-    return result
-
-
-class Policy:
-    """A function from single-precision observations to actions, for `faceoff.evaluate`; mallet velocities optionally."""
-
-    def __init__(self, act: Callable[[Any], Any], mallet_speed_m_s: float | None = None) -> None:
-        self.act = act
-        self.motion = None if mallet_speed_m_s is None else MalletMotion(1, mallet_speed_m_s, native.inverse)
-
-    def reset(self, task: str, episode: int) -> None:
-        if self.motion is not None:
-            self.motion.restart(np.ones(1, np.bool_))
-
-    def __call__(self, observation: Any) -> Any:
-        action = np.asarray(self.act(np.array(environment_observation(observation), np.float32)), np.float64)
-        return action if self.motion is None else self.motion.command(action[None])[0]
-
-
-def sb3_action(model: Any) -> Callable[[Any], Any]:
-    """What `predict` answers to an observation of the world, with the normalisation of the model's environment."""
-    normaliser = model.get_env() if isinstance(model.get_env(), VecNormalize) else None
-
-    def act(observation: Any) -> Any:
-        seen = observation[None] if normaliser is None else normaliser.normalize_obs(observation[None])
-        return model.predict(seen, deterministic=True)[0][0]
-
-    return act
 
 
 def assert_same_score(folder: Path, policy: Policy, task: str, scratch: Path, **arguments: Any) -> None:
@@ -138,17 +89,7 @@ def test_stacked_observations_are_kept_by_the_agent(tmp_path: Path) -> None:
     model = PPO("MlpPolicy", envs, n_steps=64, seed=0, device="cpu")
     model.learn(512)
     folder = faceoff.export(model, tmp_path / "agent")
-
-    class Stacking(Policy):
-        def reset(self, task: str, episode: int) -> None:
-            self.frames = np.zeros((3, 20), np.float32)
-
-        def __call__(self, observation: Any) -> Any:
-            self.frames = np.roll(self.frames, -1, axis=0)
-            self.frames[-1] = environment_observation(observation)
-            return np.asarray(self.act(self.frames.reshape(-1)), np.float64)
-
-    assert_same_score(folder, Stacking(sb3_action(model)), "defend", tmp_path, clip_actions=True)
+    assert_same_score(folder, Policy(sb3_action(model), frames=3), "defend", tmp_path, clip_actions=True)
 
 
 def test_algorithm_scales_actions_to_the_raw_space(tmp_path: Path) -> None:
