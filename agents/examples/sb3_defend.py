@@ -104,7 +104,8 @@ class Progress(BaseCallback):  # type: ignore[misc]
     """Prints the success rate of the training's episodes."""
 
     def _on_training_start(self) -> None:
-        self.started_s, self.successes = time.monotonic(), [0.0]
+        self.started_s = time.monotonic()
+        self.successes: list[bool] = []
 
     def _on_step(self) -> bool:
         self.successes += [info["is_success"] for info in self.locals["infos"] if "is_success" in info]
@@ -114,14 +115,15 @@ class Progress(BaseCallback):  # type: ignore[misc]
         if self.n_calls % 2048 == 0:
             elapsed_s, share = time.monotonic() - self.started_s, np.mean(self.successes)
             print(f"{elapsed_s:5.0f} s {self.num_timesteps:>10,} steps, {100.0 * share:.1f} % succeeded", flush=True)
-            self.successes = [0.0]
+            self.successes.clear()
 
 
 def success_rate(model: PPO, episodes: int) -> float:
     """The share of successes in the episodes of `faceoff eval --seed 0`, by Stable-Baselines3."""
     envs = make_worlds(1, seed=0)
     envs.training = False
-    observation, successes = envs.reset(), []
+    observation = envs.reset()
+    successes: list[bool] = []
     while len(successes) < episodes:
         action, _ = model.predict(observation, deterministic=True)
         observation, _, dones, infos = envs.step(action)

@@ -13,8 +13,8 @@ from typing import Any
 class BoardServer:
     """`faceoff serve` as a child process, which `stop` ends."""
 
-    def __init__(self, program: Path, folder: Path, config: str, episodes: int, seed: int) -> None:
-        """`config` has the runtime and time limits. The evaluation has this number of episodes, and this seed."""
+    def __init__(self, program: Path, folder: Path, config: str, episodes: int) -> None:
+        """`config` has the runtime and time limits. An evaluation has this number of episodes."""
         self.program = program
         self.folder = folder
         path = folder / "server.toml"
@@ -32,7 +32,6 @@ class BoardServer:
         if not self.url:
             raise RuntimeError((folder / "server.log").read_text())
         self.organiser = (folder / "data" / "admin-token").read_text().strip()
-        self.seed = seed
 
     def request(self, method: str, path: str, token: str, content: Any = None) -> Any:
         """The answer to a request that must succeed."""
@@ -43,21 +42,29 @@ class BoardServer:
             return json.loads(response.read() or "null")
 
     def score(self, agent: Path) -> dict[str, Any]:
-        """Submits an agent's folder as the page says, starts the day's evaluation, and returns the result of `defend`."""
-        team = self.request("POST", "/teams", self.organiser, {"name": "Learners"})
-        command = [self.program, "submit", agent, "--server", self.url, "--token", team["token"]]
+        """Submits an agent's folder as the page says, starts the day's evaluation, and returns the evaluation."""
+        self.team = self.request("POST", "/teams", self.organiser, {"name": "Learners"})["token"]
+        command = [self.program, "submit", agent, "--server", self.url, "--token", self.team]
         submitted = subprocess.run(command, capture_output=True, text=True)
         assert submitted.returncode == 0, submitted.stderr + submitted.stdout
         self.request("POST", "/days", self.organiser)
         while True:
             # There is no time limit, since the machine may be slow.
-            [evaluation] = self.request("GET", "/evaluations", self.organiser) or [{}]
-            if "finished_at" in evaluation:
+            evaluations = self.request("GET", "/evaluations", self.organiser)
+            if evaluations and "finished_at" in evaluations[0]:
                 break
             time.sleep(0.5)
+        [evaluation] = evaluations
         assert evaluation["state"] == "finished", json.dumps(evaluation, indent=2)
         detail: dict[str, Any] = self.request("GET", f"/evaluations/{evaluation['id']}", self.organiser)
         return detail
+
+    def dataset(self, evaluation: dict[str, Any], file: Path) -> Path:
+        """Downloads the evaluation's dataset, as its team, to this file."""
+        request = urllib.request.Request(self.url + evaluation["dataset"], headers={"Authorization": f"Bearer {self.team}"})
+        with urllib.request.urlopen(request) as response:
+            file.write_bytes(response.read())
+        return file
 
     def stop(self) -> None:
         """Kills the server; its data is not needed any more."""
