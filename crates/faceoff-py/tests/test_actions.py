@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -154,3 +156,27 @@ def test_file_works_alone_with_the_standard_library(tmp_path: Path) -> None:
     command, error = done.stdout.splitlines()
     assert command == str([list(model.START_Q), [0.0] * 7])
     assert error == "observation: expected 20 or 23 numbers, got 1"
+
+
+def test_agent_of_the_python_page_runs(tmp_path: Path) -> None:
+    """The program in docs/python.md, beside the two files that it names."""
+    root = Path(__file__).resolve().parents[3]
+    text = (root / "docs" / "python.md").read_text().split("### Write an agent")[1]
+    [program] = re.findall(r"^```python\n(from actions .*?)^```", text, re.DOTALL | re.MULTILINE)
+    (tmp_path / "actions.py").write_bytes(Path(actions.__file__).read_bytes())
+    (tmp_path / "protocol.py").write_bytes(Path(agent.__file__).read_bytes())
+    (tmp_path / "agent.py").write_text("my_policy = lambda observation: [1.0] * 7\n" + program)
+    observation = [0.0] * 20
+    messages: list[dict[str, Any]] = [
+        {"type": "hello", "protocol": 1, "task": "defend", "agent_id": 1, "env": {}},
+        {"type": "reset", "episode": 0},
+        {"type": "step", "step": 0, "obs": observation},
+        {"type": "step", "step": 1, "obs": observation},
+        {"type": "bye"},
+    ]
+    lines = "".join(json.dumps(message) + "\n" for message in messages)
+    command = [sys.executable, "-I", "-S", "-c", "import sys; sys.path[0:0] = ['.']; import agent"]
+    done = subprocess.run(command, cwd=tmp_path, input=lines, capture_output=True, text=True, check=True)
+    answers = [json.loads(line) for line in done.stdout.splitlines()]
+    expected = ActionFormat()
+    assert [answer.get("action") for answer in answers[2:]] == [expected.command([1.0] * 7) for _ in range(2)]
