@@ -56,17 +56,17 @@ class Tracker(BaseFeaturesExtractor):  # type: ignore[misc]
 
     def __init__(self, observation_space: Any) -> None:
         super().__init__(observation_space, 15)
-        # Steps since each observation; their means and scales bring the features to about [-1, 1].
+        # Steps since each observation; means and standard deviations of the features with random actions.
         self.register_buffer("age", torch.arange(FRAMES - 1, -1, -1).float()[:, None])
-        centre = [1.5, 0.0, 0.0, 0.0, 0.8, 0.0, 0.0, 0.0, 0.5, 0.0, 0.7, 1.0, 0.7, 0.0, 0.5]
-        scale = [1.0, 2.0, 0.7, 0.7, 4.0, 4.0, 1.0, 1.0, 2.0, 2.0, 1.0, 0.7, 1.0, 3.0, 1.0]
-        self.register_buffer("centre", torch.tensor(centre))
-        self.register_buffer("scale", torch.tensor(scale))
+        mean = [1.05, 0.0, -0.27, 0.0, 0.72, 0.0, 0.05, 0.0, 0.32, 0.0, 0.55, 0.78, 0.86, 0.0, 1.03]
+        deviation = [0.38, 0.28, 0.91, 0.32, 0.11, 0.15, 0.3, 0.26, 0.41, 0.33, 0.29, 0.63, 0.65, 0.34, 0.55]
+        self.register_buffer("mean", torch.tensor(mean))
+        self.register_buffer("deviation", torch.tensor(deviation))
 
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
         """Weighted means of what was seen, and the puck's arrival at the mallet."""
         frames = observations.view(-1, FRAMES, 20)
-        puck, speed, q = frames[:, :, :2], frames[:, :, 3:5], frames[:, :, 6:13]
+        puck, speed, q = frames[:, :, :2], frames[:, :, 3:5], frames[:, -2:, 6:13]
         # A lost puck is reported at its last position, at rest. So are the zeros before an episode.
         seen = (speed != 0.0).any(2, keepdim=True).float()
         weight, recent = seen * 0.65**self.age, seen * 0.3**self.age
@@ -80,8 +80,8 @@ class Tracker(BaseFeaturesExtractor):  # type: ignore[misc]
         y = position[:, 1:] + arrival_s * velocity[:, 1:]
         y = torch.where(y.abs() > RIM_Y_M, y.sign() * (2.0 * RIM_Y_M - y.abs()), y)
         features = [position, velocity, mallet[:, -1], mallet_velocity, offset, offset.norm(dim=1, keepdim=True)]
-        features += [velocity.norm(dim=1, keepdim=True), arrival_s, y - mallet[:, -1, 1:], 0.5 * weight.sum(1)]
-        return (torch.cat(features, 1) - self.centre) * self.scale
+        features += [velocity.norm(dim=1, keepdim=True), arrival_s, y - mallet[:, -1, 1:], 0.5 * weight.sum(1).clamp(max=3.0)]
+        return ((torch.cat(features, 1) - self.mean) / self.deviation).clamp(-10.0, 10.0)
 
 
 def mallet_position(q: torch.Tensor) -> torch.Tensor:
@@ -96,23 +96,29 @@ def make_worlds(count: int, seed: int) -> VecNormalize:
     envs = faceoff.sb3.make_vec_env(
         "defend", count, seed=seed, profile="evaluation", mallet_speed_m_s=MALLET_SPEED_M_S, reward=reward
     )
-    # The features are of about the same size, so only rewards are normalised.
+    # The features have their own normalisation; that of rewards is for the value function.
     return VecNormalize(VecFrameStack(envs, FRAMES), norm_obs=False)
 
 
 class Progress(BaseCallback):  # type: ignore[misc]
-    """Prints the success rate of the training's episodes."""
+    """Reduces the noise of actions in the course of the training, and prints the success rate with it."""
 
     def _on_training_start(self) -> None:
         self.started_s = time.monotonic()
         self.successes: list[bool] = []
+        # The noise follows a schedule. If it is learned, it shrinks before the policy has found out how to catch a puck.
+        self.model.policy.log_std.requires_grad_(False)
+
+    def _on_rollout_start(self) -> None:
+        remaining = self.model._current_progress_remaining
+        self.model.policy.log_std.data.fill_(-0.7 * remaining - 1.8 * (1.0 - remaining))
 
     def _on_step(self) -> bool:
         self.successes += [info["is_success"] for info in self.locals["infos"] if "is_success" in info]
         return True
 
     def _on_rollout_end(self) -> None:
-        if self.n_calls % 2048 == 0:
+        if self.n_calls % (64 * 30) == 0:
             elapsed_s, share = time.monotonic() - self.started_s, np.mean(self.successes)
             print(f"{elapsed_s:5.0f} s {self.num_timesteps:>10,} steps, {100.0 * share:.1f} % succeeded", flush=True)
             self.successes.clear()
@@ -136,7 +142,7 @@ def main() -> None:
     """Trains, evaluates and exports."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("folder", help="folder of the agent to create")
-    parser.add_argument("--steps", type=int, default=6_000_000, help="control steps to learn from (6,000,000)")
+    parser.add_argument("--steps", type=int, default=8_000_000, help="control steps to learn from (8,000,000)")
     parser.add_argument("--seed", type=int, default=1, help="seed of the network and its exploration (1)")
     parser.add_argument("--episodes", type=int, default=400, help="episodes of the evaluation (400)")
     arguments = parser.parse_args()
@@ -147,8 +153,9 @@ def main() -> None:
         n_steps=64,
         batch_size=4096,
         n_epochs=5,
-        learning_rate=lambda remaining: 7e-4 * remaining,
-        policy_kwargs={"features_extractor_class": Tracker, "net_arch": [64, 64], "log_std_init": -0.7},
+        learning_rate=lambda remaining: 1e-3 * remaining,
+        max_grad_norm=1.0,
+        policy_kwargs={"features_extractor_class": Tracker, "net_arch": [64, 64]},
         seed=arguments.seed,
         device="cpu",
     )

@@ -71,13 +71,14 @@ POLICIES: list[tuple[Callable[[], Any], str]] = [
     (lambda: linear_policy(20, 14), "policy: expected an output of shape (n, 7), got ['n', 14] of 'action'"),
     (lambda: linear_policy(20, 7, input_shape=["n", 4, 5]), "expected an input of shape (n, 20), got ['n', 4, 5]"),
     (lambda: linear_policy(20, 7, input_shape=[8, 20]), "expected an input of shape (n, 20), got [8, 20]"),
-    (lambda: linear_policy(20, 7, output_shape=["n", "m"], scale=1e30, bounded=False), "got"),
+    (lambda: linear_policy(20, 7, scale=1e38, bounded=False), "expected finite actions for all observations of the space"),
     (lambda: linear_policy(20, 7, type=TensorProto.DOUBLE), "expected float32 as its input 'observation'"),
     (lambda: linear_policy(20, 7, opset=28), "policy: expected opset 26 or earlier, which the runtime reads, got 28"),
     (lambda: linear_policy(20, 7, bounded=False), "expected actions from -1 to 1, which env accepts, got"),
     (two_inputs, "policy: expected a model with one input, got 2: observation, state"),
     (random_policy, "policy: expected the exported ONNX graph to give the policy's actions"),
     (lambda: onnx.ModelProto(), "policy: expected a valid ONNX model"),
+    (lambda: linear_policy(20, 6, output_shape=["n", "m"]), "policy: expected actions of shape (200, 7), got (200, 6)"),
 ]
 
 

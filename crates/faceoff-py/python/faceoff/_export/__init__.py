@@ -52,7 +52,7 @@ def export(
             "an agent that draws its actions (faceoff.agent)"
         )
     try:
-        import gymnasium as gymnasium
+        import gymnasium  # noqa: F401
     except ImportError as error:
         raise MissingError(f"faceoff.export needs gymnasium and onnx: {install_command('export')}") from error
     from faceoff._export import bundle, network, onnx_models

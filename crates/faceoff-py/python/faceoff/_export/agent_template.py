@@ -33,6 +33,9 @@ class Exported(Agent):
         options.intra_op_num_threads = options.inter_op_num_threads = 1
         path = Path(__file__).with_name("policy.onnx")
         self.session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+        # The first run is slower than the others, and here no time is measured.
+        shape = self.session.get_inputs()[0].shape
+        self.session.run(["action"], {"observation": np.zeros(shape, np.float32)})
         self.actions = ActionFormat(ACTION_MODE, INTERPOLATION, CLIP_ACTIONS)
         self.motion: Any = None
         if MALLET_SPEED_M_S is not None:

@@ -49,7 +49,7 @@ def write(folder: Path, name: str, model: Any, environment: PolicyEnvironment) -
     """Writes the bundle beside its place and moves it there, so that no incomplete bundle remains after an error."""
     try:
         unfinished = Path(tempfile.mkdtemp(prefix=f".{folder.name[:100]}-", dir=folder.parent))
-    except OSError as error:
+    except (OSError, ValueError) as error:
         raise ArgumentError(f"folder: expected a path in a folder that can be written, got {error}") from error
     try:
         unfinished.chmod(0o755)

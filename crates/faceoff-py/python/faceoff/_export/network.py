@@ -72,7 +72,7 @@ def make_graph(network: PolicyNetwork, environment: PolicyEnvironment) -> Any:
     graph.output.append(make_info(OUTPUT, float32, [1, environment.action_len]))
     # Shapes of inner values; they are not needed, and a batch of another size would contradict them.
     del graph.value_info[:]
-    model.ir_version = min(model.ir_version, LATEST_IR)
+    model.ir_version = min(max(model.ir_version, IR), LATEST_IR)
     try:
         onnx.checker.check_model(model)
     except Exception as error:
@@ -112,11 +112,12 @@ def check_graph(model: Any, network: PolicyNetwork, environment: PolicyEnvironme
     """
     observations = sample_observations(environment)
     seen = apply_all(environment.observation_steps, observations)
-    with np.errstate(over="ignore"):
-        expected = apply_all(environment.action_steps, np.asarray(network.predict(seen)))
     shape = (len(observations), environment.action_len)
-    if expected.shape != shape:
-        raise ArgumentError(f"policy: expected actions of shape {shape}, got {expected.shape}")
+    with np.errstate(over="ignore"):
+        predicted = np.asarray(network.predict(seen))
+        if predicted.shape != shape:
+            raise ArgumentError(f"policy: expected actions of shape {shape}, got {predicted.shape}")
+        expected = apply_all(environment.action_steps, predicted)
     if not np.isfinite(expected).all():
         raise ArgumentError("policy: expected finite actions for all observations of the space, got NaN or infinity")
     limit = environment.action_limit
