@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import tomllib
@@ -16,19 +17,18 @@ import pytest
 from gymnasium import wrappers
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from gymnasium.wrappers import vector as vector_wrappers
-from onnx import helper
 from onnx.reference import ReferenceEvaluator
 
 import faceoff
 import faceoff.gym
-from faceoff.actions import ActionFormat, environment_observation
+from faceoff.actions import environment_observation
 from faceoff.gym import AirHockeyEnv, AirHockeyVectorEnv, MalletPlane, MalletPlaneVector
 from faceoff.kinematics import MalletMotion, native
 from faceoff.sb3 import VecEnvMethods
 from onnx_policies import function_of, linear_policy
 from program import PROGRAM, REPOSITORY
 
-TARGET = PROGRAM.parents[1]
+TARGET = Path(os.environ.get("TARGET_DIR", REPOSITORY / "target"))
 
 
 def graph_of(folder: Path) -> Any:

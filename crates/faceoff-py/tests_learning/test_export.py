@@ -13,7 +13,6 @@ import gymnasium
 import numpy as np
 import onnxruntime
 import pytest
-import stable_baselines3
 import torch
 from faceoff.gym import AirHockeyEnv, AirHockeyVectorEnv, MalletPlane
 from gymnasium import wrappers
@@ -152,6 +151,7 @@ REFUSED: list[tuple[Callable[[], dict[str, Any]], str]] = [
     (lambda: {"policy": nn.Linear(23, 7), "task": "defend"}, r"expected a module that accepts observations of shape \(1, 20\)"),
     (lambda: {"policy": nn.Linear(20, 7)}, "env: expected the environment of the training, or task="),
     (lambda: {"policy": nn.Linear(20, 6), "env": AirHockeyEnv(clip_actions=True)}, r"expected actions of shape \(200, 7\)"),
+    (lambda: {"policy": nn.Linear(20, 6), "env": wrappers.ClipAction(AirHockeyEnv())}, r"expected actions of shape \(200, 7\)"),
     (lambda: {"policy": nn.Linear(20, 7), "task": "defend"}, "expected actions from -1 to 1, which env accepts"),
     (lambda: {"policy": Returning((1, 2)), "task": "defend"}, r"expected a module that returns a tensor .* got tuple"),
     (lambda: {"policy": Returning(torch.zeros(7)), "task": "defend"}, r"returns a tensor .* got shape \(7,\)"),
@@ -166,6 +166,13 @@ def test_invalid_modules_and_environments_are_refused(make: Any, message: str, t
     with pytest.raises(faceoff.Error, match=message):
         faceoff.export(arguments.pop("policy"), tmp_path / "agent", **arguments)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_mallet_speed_of_worlds_is_checked() -> None:
+    with pytest.raises(faceoff.ArgumentTypeError, match="max_speed_m_s: expected a speed above 0 and up to 5, got 'fast'"):
+        faceoff.sb3.make_vec_env("defend", 2, mallet_speed_m_s="fast")  # type: ignore[arg-type]
+    with pytest.raises(faceoff.ArgumentError, match="env: expected one made with action_mode='raw' and interpolation=3"):
+        faceoff.sb3.make_vec_env("defend", 2, mallet_speed_m_s=1.0, action_mode="delta")
 
 
 def test_worlds_in_other_processes_are_refused(tmp_path: Path) -> None:
@@ -268,7 +275,3 @@ def test_module_keeps_its_training_mode(tmp_path: Path) -> None:
         for observation in seen_observations("hit", 20):
             expected = module(torch.as_tensor(observation)[None])[0].numpy()
             np.testing.assert_allclose(exported(observation), expected, atol=1e-5)
-
-
-def test_versions_of_the_libraries_are_those_of_the_page() -> None:
-    assert stable_baselines3.__version__ == "2.9.2"

@@ -11,7 +11,7 @@ from gymnasium.vector import VectorEnv, VectorWrapper
 from gymnasium.vector.utils import batch_space
 
 from faceoff._arguments import numbers
-from faceoff.errors import ArgumentError
+from faceoff.errors import ArgumentError, ArgumentTypeError
 from faceoff.kinematics import native
 from faceoff.kinematics.arrays import Floats
 from faceoff.kinematics.mallet import MalletMotion
@@ -33,6 +33,8 @@ def _check_env(space: gymnasium.Space[Any], action_mode: str) -> None:
 
 
 def _check_speed(value: float) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
+        raise ArgumentTypeError(f"max_speed_m_s: expected a speed above 0 and up to 5, got {value!r:.80}")
     if not 0.0 < value <= 5.0:
         raise ArgumentError(f"max_speed_m_s: expected a speed above 0 and up to 5, got {value}")
     return float(value)
