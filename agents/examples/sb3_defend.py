@@ -1,4 +1,4 @@
-"""Learns to defend with Stable-Baselines3's PPO in a quarter of an hour on two cores, and makes an agent of the policy.
+"""Learns to defend with Stable-Baselines3's PPO in 20 minutes on two cores, and makes an agent of the policy.
 
     python agents/examples/sb3_defend.py my-defender
 

@@ -43,13 +43,20 @@ def seen_observations(task: str, count: int = 200) -> Any:
 
 
 def assert_same_score(folder: Path, policy: Policy, task: str, scratch: Path, **arguments: Any) -> None:
-    """The evaluator with the agent's process gives the score of the policy in this process, episode by episode."""
-    expected = faceoff.evaluate(policy, tasks=task, episodes=20, **arguments)["tasks"][task]
+    """The agent's process plays like the policy in this process, on 20 episodes.
+
+    With the exported graph the score is the same. PyTorch rounds differently, which a bounce of the puck may amplify.
+    """
     got = played(folder, task, 20, scratch)
-    for result in (got, expected):
+    graph = Policy(graph_of(folder), policy.mallet_speed_m_s, policy.count)
+    exact, own = (
+        faceoff.evaluate(player, tasks=task, episodes=20, **arguments)["tasks"][task] for player in (graph, policy)
+    )
+    for result in (got, exact):
         result["violations"].pop("computation_time", None)
-    assert got["successes"] == expected["successes"]
-    assert got["violations"] == expected["violations"]
+    for name in ("successes", "steps", "violations"):
+        assert got[name] == exact[name], name
+    assert abs(got["successes"] - own["successes"]) <= 2
 
 
 @pytest.mark.parametrize("algorithm", [PPO, A2C, SAC, TD3, DDPG])
