@@ -24,7 +24,7 @@ def test_installed_package_has_the_distribution_name() -> None:
 
 def test_install_commands_name_existing_extras() -> None:
     assert install_command("gym") == f"pip install '{DISTRIBUTION}[gym]'"
-    used = {"gym", "games", "dataset"}
+    used = {"gym", "games", "dataset", "export"}
     assert used <= set(PROJECT["optional-dependencies"])
 
 

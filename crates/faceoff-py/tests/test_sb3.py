@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import faceoff
-from faceoff.gym import AirHockeyEnv, AirHockeyVectorEnv
+from faceoff.gym import AirHockeyEnv, AirHockeyVectorEnv, MalletPlane, MalletPlaneVector
 from faceoff.sb3 import VecEnvMethods, make_vec_env
 
 
@@ -91,3 +91,22 @@ def test_other_autoreset_modes_are_refused() -> None:
         VecEnvMethods(AirHockeyVectorEnv(2))
     with pytest.raises(faceoff.ArgumentError, match="autoreset_mode"):
         make_vec_env("hit", 2, autoreset_mode="Disabled")
+
+
+def test_worlds_with_mallet_actions_equal_the_wrapper() -> None:
+    base = AirHockeyVectorEnv(3, autoreset_mode="SameStep", action_mode="raw", interpolation=3, max_episode_steps=5)
+    envs = VecEnvMethods(MalletPlaneVector(base, 1.5))
+    assert envs.action_space.shape == (2,)
+    single = MalletPlane(AirHockeyEnv(action_mode="raw", interpolation=3, max_episode_steps=5), 1.5)
+    envs.seed(3)
+    envs.reset()
+    single.reset(seed=4)
+    draws = np.random.default_rng(0)
+    for _ in range(12):
+        actions = draws.uniform(-1.0, 1.0, (3, 2))
+        envs.step_async(actions)
+        observations, _, dones, _ = envs.step_wait()
+        observation, *_ = single.step(actions[1])
+        if dones[1]:
+            observation, _ = single.reset()
+        np.testing.assert_array_equal(observations[1], observation)

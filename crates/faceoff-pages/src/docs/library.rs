@@ -85,6 +85,10 @@ static SOURCES: LazyLock<[(&str, Vec<Source>); 4]> = LazyLock::new(|| {
                     "Agents written for air_hockey_challenge: old and new names, and a converter."
                 ),
                 source!(
+                    "from-sb3",
+                    "Train with Stable-Baselines3, export the policy as an agent, and submit it."
+                ),
+                source!(
                     "tuning",
                     "How to find out whether a change of an agent is an improvement."
                 ),

@@ -10,6 +10,8 @@ Importing this package is cheap: the simulator and other packages are imported o
 - :mod:`faceoff.dataset`: recorded episodes.
 - :mod:`faceoff.challenge_2023`: agents that were written for the 2023 challenge.
 - :func:`faceoff.evaluate`: the competition's evaluator with a policy in this process.
+- :mod:`faceoff.actions`: the environments' actions and observations for agents, standard library only.
+- :func:`faceoff.export`: makes an agent of a trained policy.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from faceoff.errors import ArgumentError, ArgumentTypeError, ClosedError, Error,
 
 if TYPE_CHECKING:
     from faceoff._evaluate import evaluate
+    from faceoff._export import export
 
 __all__ = [
     "ArgumentError",
@@ -28,6 +31,7 @@ __all__ = [
     "Error",
     "OrderError",
     "evaluate",
+    "export",
 ]
 
 
@@ -36,6 +40,10 @@ def __getattr__(name: str) -> Any:
         from faceoff._evaluate import evaluate
 
         return evaluate
+    if name == "export":
+        from faceoff._export import export
+
+        return export
     if name == "__version__":
         from importlib.metadata import version
 

@@ -22,6 +22,7 @@ import numpy.typing as npt
 
 from faceoff._arguments import integer, known_names
 from faceoff.errors import ArgumentError, ArgumentTypeError, MissingError
+from faceoff.gym.mallet import MalletPlaneVector
 from faceoff.gym.vector import AirHockeyVectorEnv, read_seeds
 
 #: Result of a step in Stable-Baselines3: observations, rewards, dones, and the infos of each world.
@@ -36,16 +37,20 @@ class VecEnvMethods:
     :class:`faceoff.gym.AirHockeyEnv`.
     """
 
-    envs: AirHockeyVectorEnv
+    envs: AirHockeyVectorEnv | MalletPlaneVector
     num_envs: int
     reset_infos: list[dict[str, Any]]
+    _worlds: AirHockeyVectorEnv
     _seeds: list[int | None]
 
-    def __init__(self, envs: AirHockeyVectorEnv) -> None:
-        if not isinstance(envs, AirHockeyVectorEnv) or envs.autoreset_mode.name != "SAME_STEP":
+    def __init__(self, envs: AirHockeyVectorEnv | MalletPlaneVector) -> None:
+        worlds = envs.env if isinstance(envs, MalletPlaneVector) else envs
+        if not isinstance(worlds, AirHockeyVectorEnv) or worlds.autoreset_mode.name != "SAME_STEP":
             raise ArgumentTypeError(
-                f"envs: expected an AirHockeyVectorEnv made with autoreset_mode='SameStep', got {envs!r:.80}"
+                "envs: expected an AirHockeyVectorEnv made with autoreset_mode='SameStep', or a MalletPlaneVector "
+                f"around one, got {envs!r:.80}"
             )
+        self._worlds = worlds
         self.envs = envs
         self.num_envs = envs.num_envs
         self.render_mode = envs.render_mode
@@ -56,7 +61,7 @@ class VecEnvMethods:
         self.reset_infos = [{} for _ in range(self.num_envs)]
         self._seeds = [None] * self.num_envs
 
-    def _init_spaces(self, envs: AirHockeyVectorEnv) -> None:
+    def _init_spaces(self, envs: AirHockeyVectorEnv | MalletPlaneVector) -> None:
         self.observation_space = envs.single_observation_space
         self.action_space = envs.single_action_space
 
@@ -120,7 +125,7 @@ class VecEnvMethods:
             raise ArgumentError(
                 f"env_method: expected render, since worlds have no other method of their own, got {method_name!r}"
             )
-        frames = self.envs.render()
+        frames = self._worlds.render()
         return [frames[index] for index in self._indices(indices)]
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
@@ -129,7 +134,7 @@ class VecEnvMethods:
 
     def get_images(self) -> Sequence[npt.NDArray[np.uint8] | None]:
         """A picture of each world, for ``rgb_array``."""
-        return self.envs.render() if self.render_mode == "rgb_array" else [None] * self.num_envs
+        return self._worlds.render() if self.render_mode == "rgb_array" else [None] * self.num_envs
 
     def _indices(self, indices: None | int | Iterable[int]) -> list[int]:
         if indices is None:
@@ -155,13 +160,22 @@ def split_infos(batched: dict[str, Any], count: int) -> list[dict[str, Any]]:
     return infos
 
 
-def make_vec_env(task: str = "defend", n_envs: int = 1, *, seed: int | None = None, **env_arguments: Any) -> Any:
+def make_vec_env(
+    task: str = "defend",
+    n_envs: int = 1,
+    *,
+    seed: int | None = None,
+    mallet_speed_m_s: float | None = None,
+    **env_arguments: Any,
+) -> Any:
     """A ``stable_baselines3.common.vec_env.VecEnv`` of ``n_envs`` worlds.
 
     Args:
         task, env_arguments: as for :class:`faceoff.gym.AirHockeyVectorEnv`, without ``autoreset_mode``.
         n_envs: number of worlds.
         seed: s for the seeds s, s + 1, … of the first reset.
+        mallet_speed_m_s: wraps the worlds in :class:`faceoff.gym.MalletPlaneVector` with this maximum speed: actions
+            are then (2,) mallet velocities as shares of it.
 
     Raises:
         MissingError: if Stable-Baselines3 is not installed.
@@ -180,10 +194,17 @@ def make_vec_env(task: str = "defend", n_envs: int = 1, *, seed: int | None = No
     class FaceoffVecEnv(VecEnvMethods, VecEnv):  # type: ignore[misc]
         """Worlds of a task, for Stable-Baselines3."""
 
-        def _init_spaces(self, envs: AirHockeyVectorEnv) -> None:
+        def _init_spaces(self, envs: AirHockeyVectorEnv | MalletPlaneVector) -> None:
             VecEnv.__init__(self, envs.num_envs, envs.single_observation_space, envs.single_action_space)
 
-    env = FaceoffVecEnv(AirHockeyVectorEnv(count, task, autoreset_mode="SameStep", **env_arguments))  # type: ignore[arg-type]
+    if mallet_speed_m_s is not None:
+        # The only arguments that the wrapper accepts.
+        env_arguments = {"action_mode": "raw", "interpolation": 3, **env_arguments}
+    envs: AirHockeyVectorEnv | MalletPlaneVector
+    envs = AirHockeyVectorEnv(count, task, autoreset_mode="SameStep", **env_arguments)  # type: ignore[arg-type]
+    if mallet_speed_m_s is not None:
+        envs = MalletPlaneVector(envs, mallet_speed_m_s)
+    env = FaceoffVecEnv(envs)
     if seed is not None:
         env.seed(seed)
     return env

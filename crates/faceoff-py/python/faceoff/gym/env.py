@@ -12,7 +12,17 @@ import numpy.typing as npt
 from gymnasium.wrappers import TimeLimit
 
 from faceoff import _native
-from faceoff._arguments import ActionMode, Task, integer, numbers, one_of, seed_number, write_setup
+from faceoff._arguments import (
+    ActionMode,
+    Task,
+    flag,
+    integer,
+    interpolation_code,
+    numbers,
+    one_of,
+    seed_number,
+    write_setup,
+)
 from faceoff.errors import ArgumentError, ArgumentTypeError, ClosedError
 from faceoff.gym.reward import Reward, State, Transition
 from faceoff.gym.rows import Rows
@@ -83,6 +93,8 @@ class AirHockeyEnv(gymnasium.Env[Any, Any]):
             raise ArgumentTypeError(f"reward: expected a function of a Transition, got {reward!r}")
         self.task = task
         self.action_mode = action_mode
+        self.interpolation = interpolation_code(interpolation)
+        self.clip_actions = flag("clip_actions", clip_actions)
         self.render_mode = render_mode
         self.observation_space = observation_space(task)
         self.action_space = action_space(interpolation, action_mode)

@@ -48,7 +48,8 @@ class MalletPlane(gymnasium.ActionWrapper[Any, Any, Any]):
     def __init__(self, env: gymnasium.Env[Any, Any], max_speed_m_s: float = 1.0) -> None:
         super().__init__(env)
         _check_env(env.action_space, getattr(env.unwrapped, "action_mode", "none"))
-        self.motion = MalletMotion(1, real("max_speed_m_s", max_speed_m_s, 0.0, MAX_SPEED_M_S), native.inverse)
+        self.max_speed_m_s = real("max_speed_m_s", max_speed_m_s, 0.0, MAX_SPEED_M_S)
+        self.motion = MalletMotion(1, self.max_speed_m_s, native.inverse)
         self.action_space = Box(-1.0, 1.0, (2,), np.float32)
 
     def reset(
@@ -74,7 +75,8 @@ class MalletPlaneVector(VectorWrapperBase):
     def __init__(self, env: VectorEnv[Any, Any, Any], max_speed_m_s: float = 1.0) -> None:
         super().__init__(env)
         _check_env(env.action_space, getattr(env.unwrapped, "action_mode", "none"))
-        self.motion = MalletMotion(env.num_envs, real("max_speed_m_s", max_speed_m_s, 0.0, MAX_SPEED_M_S), native.inverse)
+        self.max_speed_m_s = real("max_speed_m_s", max_speed_m_s, 0.0, MAX_SPEED_M_S)
+        self.motion = MalletMotion(env.num_envs, self.max_speed_m_s, native.inverse)
         self.single_action_space = Box(-1.0, 1.0, (2,), np.float32)
         self.action_space = batch_space(self.single_action_space, env.num_envs)
         self._ended = np.zeros(env.num_envs, np.bool_)
@@ -93,16 +95,29 @@ class MalletPlaneVector(VectorWrapperBase):
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         """Like the method of the wrapped environment."""
+        return self._restart_motions(self.env.step(self._command(actions)))
+
+    def send(self, actions: Any) -> None:
+        """Like the method of :class:`AirHockeyVectorEnv`, which this wrapper has to wrap directly."""
+        self.env.send(self._command(actions))  # type: ignore[attr-defined]
+
+    def recv(self) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
+        """Waits for the step that :meth:`send` began, and returns its result."""
+        return self._restart_motions(self.env.recv())  # type: ignore[attr-defined]
+
+    def _command(self, actions: Any) -> Floats:
         checked = numbers("actions", actions, (self.num_envs, 2))
         if not np.isfinite(checked).all():
             world, index = np.argwhere(~np.isfinite(checked))[0]
             raise ArgumentError(
                 f"actions: expected finite numbers, got {checked[world, index]} at index {index} of world {world}"
             )
-        result = self.env.step(self.motion.command(checked))
+        return self.motion.command(checked)
+
+    def _restart_motions(self, result: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         ended = result[2] | result[3]
         same_step = self.env.metadata["autoreset_mode"].name == "SAME_STEP"
         # Motions of the worlds in which this step began an episode.
         self.motion.restart(ended if same_step else self._ended)
         self._ended = ended.copy()
-        return result
+        return result  # type: ignore[no-any-return]

@@ -13,7 +13,18 @@ from gymnasium.vector import VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from faceoff import _native
-from faceoff._arguments import ActionMode, Task, flag, integer, mask, numbers, one_of, seed_number, write_setup
+from faceoff._arguments import (
+    ActionMode,
+    Task,
+    flag,
+    integer,
+    interpolation_code,
+    mask,
+    numbers,
+    one_of,
+    seed_number,
+    write_setup,
+)
 from faceoff.errors import ArgumentError, ArgumentTypeError, ClosedError, OrderError
 from faceoff.gym.call_guard import CallGuard, exclusive
 from faceoff.gym.env import AirHockeyEnv, read_options
@@ -99,6 +110,8 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
         self._threads = integer("threads", threads, 1, 1024)
         self.task = task
         self.action_mode = action_mode
+        self.interpolation = interpolation_code(interpolation)
+        self.clip_actions = flag("clip_actions", clip_actions)
         self.copy = flag("copy", copy)
         self.render_mode = render_mode
         self.metadata = {**AirHockeyEnv.metadata, "render_modes": ["rgb_array"]}

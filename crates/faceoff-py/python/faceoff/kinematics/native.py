@@ -4,7 +4,8 @@ The functions have the names, arguments and errors of those in `faceoff.kinemati
 are faster, `inverse` above all, and release the interpreter's lock. The same arguments give the same bits on every
 machine, alone or in a batch. `speed_share` is the NumPy function; trajectories are only in `faceoff.kinematics`.
 
-Bundles do not contain the compiled half. `faceoff.kinematics` imports neither it nor this module.
+A bundle that uses this module contains the compiled half, as `faceoff.export` writes it for mallet actions.
+`faceoff.kinematics` imports neither it nor this module.
 """
 
 import numpy as np
