@@ -11,7 +11,8 @@ use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{Episode, Factor, Factors, Interpolation, PerturbationSettings, Plant};
 use faceoff_types::{EPISODE_STEPS, Seed};
 use pyo3::prelude::*;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use serde_json::Value;
 
 /// Setup of an environment, written by the Python half in JSON.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -41,8 +42,7 @@ impl Setup {
     /// # Errors
     /// If the setup is invalid.
     pub fn read(json: &str) -> PyResult<Self> {
-        let setup: Self = serde_json::from_str(json)
-            .map_err(|error| argument_error("setup", "a setup in JSON", error))?;
+        let setup: Self = read_json(json)?;
         if !(1..=EPISODE_STEPS).contains(&setup.max_episode_steps) {
             return Err(argument_error(
                 "max_episode_steps",
@@ -105,6 +105,25 @@ impl Setup {
             ),
         }
     }
+}
+
+/// Parses what the Python half has written. It has checked all but the magnitudes of perturbations.
+///
+/// # Errors
+/// If it is invalid.
+pub fn read_json<T: DeserializeOwned>(json: &str) -> PyResult<T> {
+    let setup_error = |error| argument_error("setup", "a setup in JSON", error);
+    let setup: Value = serde_json::from_str(json).map_err(setup_error)?;
+    if let Some(magnitudes) = setup.get("perturbations") {
+        PerturbationSettings::deserialize(magnitudes).map_err(|error| {
+            argument_error(
+                "perturbations",
+                "magnitudes of factors by their names",
+                error,
+            )
+        })?;
+    }
+    serde_json::from_value(setup).map_err(setup_error)
 }
 
 /// Refuses magnitudes that are out of range, or for which no plant is found.

@@ -47,6 +47,12 @@ impl Snapshot {
         self.world.origin.number
     }
 
+    /// Control steps after which the episode is truncated.
+    #[getter]
+    fn max_episode_steps(&self) -> u32 {
+        self.setup.max_episode_steps
+    }
+
     /// Control steps of the episode so far.
     #[getter]
     fn steps(&self) -> u32 {

@@ -81,7 +81,7 @@ assert observation.shape == episode.observations[0].shape
 print(json.dumps(env.spec.kwargs))
 """
     environment = {**os.environ, "MINARI_DATASETS_PATH": str(tmp_path)}
-    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True)
+    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, timeout=600, text=True)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout) == {
         "task": "defend",

@@ -19,6 +19,7 @@ import pytest
 
 pq = pytest.importorskip("pyarrow.parquet")
 
+import faceoff
 import faceoff.dataset as fd  # noqa: E402
 from dataset_recordings import FIXTURES, PROGRAM, ROOT, game, hold, odd  # noqa: E402
 
@@ -135,12 +136,20 @@ def test_plain_parquet_has_all_tables_with_the_same_values(tmp_path: Path) -> No
             chunk = got.metadata.row_group(0).column(3)
             assert (chunk.compression, set(chunk.encodings) - {"RLE"}) == ("SNAPPY", {"PLAIN"})
             assert got.read().to_pylist() == expected.read().to_pylist()
+            assert got.metadata.metadata[b"faceoff.schema"] == expected.metadata.metadata[b"faceoff.schema"]
 
 
-def test_plain_parquet_refuses_an_existing_folder_and_leaves_nothing(tmp_path: Path) -> None:
+def test_plain_parquet_leaves_nothing_after_an_error(tmp_path: Path) -> None:
     (tmp_path / "there").mkdir()
     with pytest.raises(fd.ExistsError, match="out: .*there is there already; name another folder"):
         fd.to_parquet(fd.open(hold()), tmp_path / "there")
+    with pytest.raises(faceoff.ArgumentTypeError, match="recording: expected what faceoff.dataset.open returns, got 'x'"):
+        fd.to_parquet("x", tmp_path / "new")  # type: ignore[arg-type]
+    with pytest.raises(faceoff.ArgumentTypeError, match="out: expected a path, got 5"):
+        fd.to_parquet(fd.open(hold()), 5)  # type: ignore[arg-type]
+    (tmp_path / "there" / "file").touch()
+    with pytest.raises(faceoff.ArgumentError, match="out: expected a folder that can be created"):
+        fd.to_parquet(fd.open(hold()), tmp_path / "there" / "file" / "new")
     damaged = tmp_path / "damaged"
     with zipfile.ZipFile(hold() / "dataset.zip") as packed:
         packed.extractall(damaged)

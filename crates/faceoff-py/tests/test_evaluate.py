@@ -110,7 +110,7 @@ def test_binary_gives_the_same_numbers(profile: str, tmp_path: Path) -> None:
     assert BINARY.exists(), f"build it first: cargo build --workspace --bins ({BINARY})"
     command: list[str | Path] = [BINARY, "eval", ROOT / "agents" / "hold", "--no-sandbox"]
     command += ["--episodes", "6", "--seed", "17", "--profile", profile, "--out", tmp_path]
-    subprocess.run(command, check=True, capture_output=True, cwd=tmp_path)
+    subprocess.run(command, check=True, capture_output=True, timeout=600, cwd=tmp_path)
     from_program = json.loads((tmp_path / "results.json").read_text())
     from_package = faceoff.evaluate(
         HoldFirst(), episodes=6, seed=17, profile=profile, interpolation=3, action_mode="raw"
@@ -139,7 +139,7 @@ def test_binary_gives_the_same_numbers(profile: str, tmp_path: Path) -> None:
 def test_dataset_has_the_seed_of_its_robot(tmp_path: Path) -> None:
     command: list[str | Path] = [BINARY, "eval", ROOT / "agents" / "hold", "--no-sandbox", "--task", "defend"]
     command += ["--episodes", "4", "--seed", "17", "--mismatch-seed", "9", "--out", tmp_path]
-    subprocess.run(command, check=True, capture_output=True, cwd=tmp_path)
+    subprocess.run(command, check=True, capture_output=True, timeout=600, cwd=tmp_path)
     dataset = faceoff.dataset.open(tmp_path)
     actions = [dataset.episode("defend", episode).to_numpy().actions for episode in range(4)]
 
@@ -207,7 +207,7 @@ def test_workers_play_policies_defined_anywhere(policy: str, source: str, tmp_pa
     file = tmp_path / "script.py"
     file.write_text(script)
     command = [sys.executable, *([file] if source == "file" else ["-"])]
-    done = subprocess.run(command, input=script, capture_output=True, text=True, cwd=tmp_path)
+    done = subprocess.run(command, input=script, capture_output=True, timeout=600, text=True, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     expected = faceoff.evaluate(lambda observation: np.zeros(7), tasks="defend", episodes=3, seed=5)
     assert json.loads(done.stdout) == [outcome["steps"] for outcome in expected["episodes"]]
@@ -215,7 +215,7 @@ def test_workers_play_policies_defined_anywhere(policy: str, source: str, tmp_pa
 
 def test_without_cloudpickle_the_error_says_what_to_do(tmp_path: Path) -> None:
     script = SCRIPT.format(before="sys.modules['cloudpickle'] = None", policy=POLICIES["lambda"])
-    done = subprocess.run([sys.executable, "-"], input=script, capture_output=True, text=True, cwd=tmp_path)
+    done = subprocess.run([sys.executable, "-"], input=script, capture_output=True, timeout=600, text=True, cwd=tmp_path)
     assert "faceoff.errors.ArgumentTypeError: policy: expected one" in done.stderr
     assert "pip install cloudpickle" in done.stderr
     assert "workers=1" in done.stderr
@@ -230,12 +230,76 @@ def test_exception_of_a_policy_in_a_worker_is_raised() -> None:
     assert "in policy" in str(raised.value.__cause__)
 
 
-def test_death_of_a_worker_is_told() -> None:
+def test_death_of_a_worker_is_an_error() -> None:
     def policy(observation: np.ndarray) -> np.ndarray:
         os._exit(7)
 
     with pytest.raises(faceoff.Error, match="workers: expected a result .* ended with status 7"):
         faceoff.evaluate(policy, tasks="defend", episodes=2, workers=2)
+
+
+def test_error_in_one_worker_ends_the_others(tmp_path: Path) -> None:
+    """The first worker would never end."""
+    path = str(tmp_path / "process")
+
+    class Policy:
+        def reset(self, task: str, episode: int) -> None:
+            if episode == 0:
+                Path(path).write_text(str(os.getpid()))
+                threading.Event().wait()
+            while not Path(path).exists():
+                pass
+            raise LookupError("no such thing")
+
+        def __call__(self, observation: np.ndarray) -> np.ndarray:
+            return np.zeros(7)
+
+    with pytest.raises(LookupError, match="no such thing"):
+        faceoff.evaluate(Policy(), tasks="defend", episodes=2, workers=2)
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(Path(path).read_text()), 0)
+
+
+def test_workers_end_with_the_process_that_started_them(tmp_path: Path) -> None:
+    script = """
+import os, pathlib, threading
+import faceoff
+def policy(observation):
+    pathlib.Path(f"worker-{os.getpid()}").touch()
+    threading.Event().wait()
+threading.Timer(0.0, lambda: None).start()
+faceoff.evaluate(policy, tasks="defend", episodes=2, workers=2)
+"""
+    parent = subprocess.Popen([sys.executable, "-c", script], cwd=tmp_path)
+    while len(workers := list(tmp_path.glob("worker-*"))) < 2:
+        assert parent.poll() is None
+    parent.kill()
+    parent.wait()
+    for worker in workers:
+        # They have no parent that waits for them, so they disappear when they end.
+        while Path(f"/proc/{worker.name.removeprefix('worker-')}").exists():
+            state = Path(f"/proc/{worker.name.removeprefix('worker-')}/stat")
+            if state.exists() and ") Z " in state.read_text(errors="replace"):
+                break
+
+
+def test_exceptions_of_a_script_are_raised_as_they_are(tmp_path: Path) -> None:
+    script = """
+import faceoff
+class OwnError(Exception): ...
+def policy(observation):
+    raise OwnError("own")
+try:
+    faceoff.evaluate(policy, tasks="defend", episodes=2, workers=2)
+except OwnError as error:
+    print("caught", error)
+"""
+    (tmp_path / "struct.py").write_text("raise SystemError('a file of the current folder')")
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "script.py").write_text(script)
+    command = [sys.executable, "sub/script.py"]
+    done = subprocess.run(command, capture_output=True, timeout=600, text=True, cwd=tmp_path)
+    assert done.stdout == "caught own\n", done.stderr
 
 
 def test_policy_that_cannot_be_sent_is_refused() -> None:

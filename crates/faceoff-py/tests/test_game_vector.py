@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -11,7 +12,7 @@ import faceoff
 import numpy as np
 import pytest
 from commands import runaway_action
-from faceoff.game import AirHockeyGame, AirHockeyGameVectorEnv, GameTransition, SelfPlayVectorEnv
+from faceoff.game import AirHockeyGame, AirHockeyGameVectorEnv, GameTransition, SelfPlayEnv, SelfPlayVectorEnv
 from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 MODES = ["NextStep", "SameStep", "Disabled"]
@@ -243,9 +244,85 @@ def test_each_game_is_played_against_one_opponent_of_the_pool(mode: str) -> None
     for actions in random_actions(8, 44):
         envs.step(actions)
     games = len(first.begun) + len(second.begun) + len(late.begun)
-    assert games == 8 * 5 if mode == "SameStep" else games == 8 * 4 + 8 * (44 > 43)
+    # In 44 steps four games end; with NextStep each takes a step more, in which the next one begins.
+    assert games == 8 * 5
     assert late.begun
     assert sorted(set(first.begun + second.begun + late.begun)) == list(range(8))
+
+
+def test_opponent_and_side_follow_from_seed_and_number() -> None:
+    pool = [hold] * 50
+
+    def drawn(infos: dict[str, Any]) -> list[tuple[int, str]]:
+        return list(zip(infos["opponent"].tolist(), infos["side"].tolist(), strict=True))
+
+    envs = SelfPlayVectorEnv(8, pool, side="random", max_steps=3, autoreset_mode="Disabled")
+    first = drawn(envs.reset(seed=3)[1])
+    assert drawn(SelfPlayVectorEnv(8, pool, side="random").reset(seed=range(3, 11))[1]) == first
+    second = drawn(envs.reset()[1])
+    assert second != first
+    single = SelfPlayEnv(pool, side="random")
+    for index in range(8):
+        infos = [single.reset(seed=np.int64(3 + index))[1], single.reset()[1]]  # type: ignore[arg-type]
+        assert [(info["opponent"], info["side"]) for info in infos] == [first[index], second[index]]
+    mask = np.arange(8) == 5
+    assert drawn(envs.reset(seed=[3 + index for index in range(8)], options={"reset_mask": mask})[1])[5] == first[5]
+
+
+def test_games_keep_their_opponent_while_the_pool_changes() -> None:
+    old, new = Pool(), Pool()
+    envs = SelfPlayVectorEnv(3, [old, old], max_steps=4, autoreset_mode="SameStep")
+    envs.reset(seed=1)
+    envs.opponents[:] = [new]
+    for _ in range(4):
+        assert new.rows == 0
+        envs.step(np.zeros((3, 7)))
+    envs.step(np.zeros((3, 7)))
+    assert (old.rows, new.rows) == (12, 3)
+
+
+def test_invalid_pool_is_refused_before_the_step() -> None:
+    envs = SelfPlayVectorEnv(2, [hold], max_steps=2, autoreset_mode="SameStep")
+    envs.reset(seed=1)
+    envs.step(np.zeros((2, 7)))
+    envs.opponents.append(3)  # type: ignore[arg-type]
+    with pytest.raises(faceoff.ArgumentTypeError, match=r"opponents\[1\]"):
+        envs.step(np.zeros((2, 7)))
+    envs.opponents.pop()
+    *_, truncated, infos = envs.step(np.zeros((2, 7)))
+    assert truncated.all() and infos["_final_info"].all()
+
+
+def test_opponents_play_no_game_that_is_over() -> None:
+    class Log(Pool):
+        def __call__(self, observations: np.ndarray) -> np.ndarray:
+            calls.append("act")
+            return super().__call__(observations)
+
+        def reset(self, games: np.ndarray) -> None:
+            calls.append("reset")
+
+    calls: list[str] = []
+    envs = SelfPlayVectorEnv(1, [Log()], max_steps=2)
+    envs.reset(seed=1)
+    for _ in range(4):
+        envs.step(np.zeros((1, 7)))
+    assert calls == ["reset", "act", "act", "reset", "act"]
+
+
+def test_returned_observations_may_be_changed() -> None:
+    seen: list[np.ndarray] = []
+
+    def reward(transition: GameTransition) -> np.ndarray:
+        seen.append(transition.observations.copy())
+        return np.zeros((2, 2))
+
+    envs = AirHockeyGameVectorEnv(2, reward=reward, autoreset_mode="Disabled")
+    observations, _ = envs.reset(seed=1)
+    kept = observations.copy()
+    observations *= 0.0
+    envs.step(np.zeros((4, 7)))
+    np.testing.assert_array_equal(seen[0].reshape(4, 23), kept)
 
 
 @pytest.mark.parametrize("side", ["robot_1", "robot_2", "random"])
@@ -350,8 +427,51 @@ def test_wrong_answer_of_an_opponent_is_named() -> None:
         envs.step(np.zeros((2, 7)))
 
 
-def test_reward_of_a_wrong_shape_is_refused() -> None:
-    envs = AirHockeyGameVectorEnv(3, reward=lambda transition: np.zeros(3))
+@pytest.mark.parametrize("value", [np.zeros(3), "abc", None, {}, 1j, [[1], [2, 3]], [10**400, 0], np.full((3, 2), np.nan)])
+def test_reward_that_is_no_array_of_numbers_is_refused(value: Any) -> None:
+    envs = AirHockeyGameVectorEnv(3, reward=lambda transition: value)
     envs.reset(seed=1)
-    with pytest.raises(faceoff.ArgumentError, match=r"reward: expected a function that returns finite .* \(3, 2\)"):
+    with pytest.raises(faceoff.Error, match=r"reward: expected a function that returns finite numbers of shape \(3, 2\)"):
         envs.step(np.zeros((6, 7)))
+    game = AirHockeyGame(reward=lambda transition: value)
+    game.reset(seed=1)
+    with pytest.raises(faceoff.Error, match=r"reward: expected a function that returns finite numbers of shape \(2,\)"):
+        game.step({agent: np.zeros(7) for agent in game.agents})
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [([1], "options: expected a mapping"), ({"oponent": 0}, "options: expected opponent, got 'oponent'")],
+)
+def test_options_of_self_play_are_checked(options: Any, message: str) -> None:
+    with pytest.raises(faceoff.Error, match=message):
+        SelfPlayEnv([hold]).reset(options=options)
+
+
+def test_calls_of_two_threads_at_once_are_refused() -> None:
+    game = AirHockeyGame(profile="evaluation")
+    game.reset(seed=1)
+    twin = copy.deepcopy(game)
+    actions = {agent: np.zeros(7) for agent in game.agents}
+    stop, refused = threading.Event(), []
+
+    def disturb() -> None:
+        while not stop.is_set():
+            try:
+                game.step({"robot_1": np.full(7, np.nan), "robot_2": np.zeros(7)})
+            except faceoff.Error as error:
+                refused.append(type(error))
+
+    thread = threading.Thread(target=disturb)
+    thread.start()
+    try:
+        for _ in range(500):
+            try:
+                got = game.step(actions)[0]
+            except faceoff.OrderError:
+                continue
+            np.testing.assert_array_equal(got["robot_1"], twin.step(actions)[0]["robot_1"])
+    finally:
+        stop.set()
+        thread.join()
+    assert set(refused) <= {faceoff.ArgumentError, faceoff.OrderError}

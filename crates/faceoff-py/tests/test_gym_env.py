@@ -11,7 +11,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from gymnasium.wrappers import NormalizeObservation, RecordEpisodeStatistics, TimeLimit
+from gymnasium.wrappers import MaxAndSkipObservation, NormalizeObservation, RecordEpisodeStatistics, TimeLimit
 
 import faceoff.gym
 from faceoff import _native
@@ -308,6 +308,30 @@ def test_time_limit_added_later_keeps_the_seed() -> None:
     steps, info = played_to_the_end(TimeLimit(env, 10))
     assert (steps, info["end"]) == (10, "horizon")
     assert env.reset()[1] == {"seed": 5, "episode_number": 2}
+    assert played_to_the_end(env)[0] > 10, "the limit is that of the wrapper"
+
+
+def test_time_limit_around_other_wrappers_is_theirs() -> None:
+    env = TimeLimit(MaxAndSkipObservation(AirHockeyEnv("prepare"), skip=4), 50)
+    steps, info = played_to_the_end(env, seed=5)
+    assert steps == 50
+
+
+def test_refused_reset_with_a_time_limit_changes_nothing() -> None:
+    env = AirHockeyEnv("prepare")
+    env.reset(seed=5)
+    with pytest.raises(faceoff.ArgumentError, match="puck"):
+        TimeLimit(env, 50).reset(options={"puck": [np.nan] * 6})
+    assert env.reset()[1] == {"seed": 5, "episode_number": 1}
+
+
+def test_state_moves_between_environments_with_a_time_limit() -> None:
+    first, second = (gymnasium.make("faceoff/AirHockey-Prepare-v0", max_episode_steps=40) for _ in range(2))
+    first.reset(seed=5)
+    first.step(np.full(7, 0.5, np.float32))
+    observation, info = second.unwrapped.restore(first.unwrapped.save())
+    assert info == {"seed": 5, "episode_number": 0}
+    np.testing.assert_array_equal(observation, first.unwrapped._rows.observations[0])
 
 
 @pytest.mark.parametrize("steps", [501, 100_000])
@@ -325,7 +349,7 @@ def test_make_imports_the_module_of_its_id() -> None:
         "import gymnasium, sys; env = gymnasium.make('faceoff.gym:faceoff/AirHockey-Defend-v0');"
         "print(env.reset(seed=1)[1], 'faceoff.gym' in sys.modules)"
     )
-    done = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True)
+    done = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, timeout=600, text=True)
     assert done.stdout == "{'seed': 1, 'episode_number': 0} True\n"
 
 

@@ -350,7 +350,7 @@ def test_folder_under_any_name_needs_no_compiled_half(name: str, tmp_path: Path)
         "print(arm.inverse((0.8, 0.1))[1], arm.MalletMotion(1, 1.0).xy.shape, arm.__file__)\n"
         f"print(*(name for name in sys.modules if 'faceoff' in name and not name.startswith('{first}')), sep='')\n"
     )
-    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True)
+    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, timeout=600, text=True)
     assert done.stdout == f"True (1, 2) {tmp_path / name / '__init__.py'}\n\n", done.stderr
 
 
@@ -362,5 +362,5 @@ def test_names_equal_those_of_numpy_except_trajectories() -> None:
 
 def test_import_of_numpy_functions_loads_no_compiled_ones() -> None:
     program = "import faceoff.kinematics, sys; print(*(name for name in sys.modules if name.endswith('native')))"
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, timeout=600, text=True)
     assert done.stdout == "\n", done.stderr

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from faceoff.errors import ArgumentError, ArgumentTypeError, ClosedError, Error, OrderError
+from faceoff.errors import ArgumentError, ArgumentTypeError, ClosedError, Error, MissingError, OrderError
 
 if TYPE_CHECKING:
     from faceoff._evaluate import evaluate
@@ -29,6 +29,7 @@ __all__ = [
     "ArgumentTypeError",
     "ClosedError",
     "Error",
+    "MissingError",
     "OrderError",
     "evaluate",
     "export",

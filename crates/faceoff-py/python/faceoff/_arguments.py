@@ -84,6 +84,8 @@ def real(name: str, value: object, above: float, highest: float) -> float:
     """``value`` as a float above ``above`` and up to ``highest``."""
     try:
         number = float(value)  # type: ignore[arg-type]
+    except OverflowError:
+        number = math.inf
     except (TypeError, ValueError, RuntimeError):
         number = math.nan
     if isinstance(value, (str, bytes, bool, np.bool_)) or math.isnan(number):

@@ -25,7 +25,7 @@ from faceoff._arguments import (
     perturbations_json,
     seed_text,
 )
-from faceoff._workers import pickled, run_in_workers
+from faceoff._workers import pickle_value, run_in_workers
 from faceoff.errors import ArgumentError, ArgumentTypeError
 
 #: From an observation, (20,) or (23,) float64 as the protocol has it, to an action.
@@ -62,8 +62,8 @@ def evaluate(
         interpolation, action_mode, clip_actions: as for the environments; ``raw`` actions are those that an agent
             sends. The action may have any shape with the right count of numbers, such as (2, 7).
         perturbations: magnitudes that replace those of the ruleset.
-        workers: number of processes, each with a copy of the policy, which may be defined anywhere. Results do not
-            depend on it.
+        workers: number of processes, each with a copy of the policy, which may be defined anywhere. Results depend on it
+            only if the policy itself keeps a state from one episode to the next.
 
     Returns:
         The content of ``results.json`` as ``faceoff eval`` writes it, with None for computation times, which are not
@@ -96,7 +96,7 @@ def evaluate(
             outcomes += _run_episodes(evaluation, setup, policies[task], task, range(count))
     else:
         # A policy of all tasks is sent once, so that it remains one object.
-        value = pickled("policy", policies)
+        value = pickle_value("policy", policies)
         parts = [[(task, range(first, count, processes)) for task in selected] for first in range(processes)]
         outcomes += run_in_workers(_run_in_process, [(value, (setup, part)) for part in parts if len(part[0][1]) > 0])
     result: dict[str, Any] = json.loads(evaluation.score(outcomes))

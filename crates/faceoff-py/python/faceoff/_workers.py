@@ -11,9 +11,10 @@ import os
 import pickle
 import subprocess
 import sys
+import threading
 import traceback
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from typing import Any
 
 from faceoff.errors import ArgumentTypeError, Error
@@ -22,29 +23,40 @@ from faceoff.errors import ArgumentTypeError, Error
 PROGRAM = "import pickle, sys; sys.path[:] = pickle.load(sys.stdin.buffer); from faceoff._workers import main; main()"
 
 
-def pickled(name: str, value: object) -> bytes:
+def pickle_value(name: str, value: object) -> bytes:
     """``value`` for a worker; ``name`` is the argument's, for the error message."""
     try:
-        import cloudpickle
-    except ImportError:
-        cloudpickle = None
-    try:
-        if cloudpickle is not None:
-            data: bytes = cloudpickle.dumps(value)
-            return data
-        data = pickle.dumps(value)
+        data = _dump(value)
     except Exception as error:
-        hint = "keep open files, locks and loggers out of it" if cloudpickle else "pip install cloudpickle"
+        hint = "keep open files, locks and loggers out of it" if _pickles_by_value() else "pip install cloudpickle"
         raise ArgumentTypeError(
             f"{name}: expected one that can be sent to other processes, got one that cannot ({error}): {hint}, or use "
             "workers=1"
         ) from None
     # A worker has another main module.
-    if b"__main__" in data:
+    if b"__main__" in data and not _pickles_by_value():
         raise ArgumentTypeError(
             f"{name}: expected one defined in a module, got one of the script or session itself, which other processes "
             "cannot import: pip install cloudpickle, put it in a module, or use workers=1"
         )
+    return data
+
+
+def _pickles_by_value() -> bool:
+    """Whether cloudpickle is installed."""
+    try:
+        import cloudpickle  # noqa: F401
+    except ImportError:
+        return False
+    return True
+
+
+def _dump(value: object) -> bytes:
+    if not _pickles_by_value():
+        return pickle.dumps(value)
+    import cloudpickle
+
+    data: bytes = cloudpickle.dumps(value)
     return data
 
 
@@ -62,15 +74,17 @@ def run_in_workers(function: Callable[..., list[Any]], jobs: Sequence[tuple[byte
     try:
         for _ in jobs:
             processes.append(
-                subprocess.Popen([sys.executable, "-c", PROGRAM], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+                subprocess.Popen([sys.executable, "-P", "-c", PROGRAM], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
             )
         path = pickle.dumps(sys.path)
         requests = [path + pickle.dumps((function, value, arguments)) for value, arguments in jobs]
         with ThreadPoolExecutor(len(jobs)) as threads:
-            # An error of one ends the others, whose results would be thrown away.
-            futures = [threads.submit(_result, *pair) for pair in zip(processes, requests, strict=True)]
+            futures = [threads.submit(_read_result, *pair) for pair in zip(processes, requests, strict=True)]
             try:
-                return [outcome for future in futures for outcome in future.result()]
+                done, _ = wait(futures, return_when=FIRST_EXCEPTION)
+                failed = [future for future in futures if future in done and future.exception() is not None]
+                # After an error the results of the others would be thrown away, so they are not waited for.
+                return [outcome for future in failed or futures for outcome in future.result()]
             finally:
                 _end(processes)
     finally:
@@ -82,13 +96,21 @@ def _end(processes: Sequence[subprocess.Popen[bytes]]) -> None:
         if process.poll() is None:
             process.kill()
         process.wait()
+        for pipe in (process.stdin, process.stdout):
+            if pipe is not None:
+                pipe.close()
 
 
-def _result(process: subprocess.Popen[bytes], request: bytes) -> list[Any]:
+def _read_result(process: subprocess.Popen[bytes], request: bytes) -> list[Any]:
+    assert process.stdin is not None and process.stdout is not None
     try:
-        answer, _ = process.communicate(request)
+        # Standard input stays open: its end tells the worker that this process is gone.
+        process.stdin.write(request)
+        process.stdin.flush()
     except BrokenPipeError:
-        answer = b""
+        pass
+    answer = process.stdout.read()
+    process.wait()
     if process.returncode != 0 or not answer:
         raise Error(
             f"workers: expected a result of each process, but one ended with status {process.returncode}; its last output "
@@ -115,13 +137,23 @@ def main() -> None:
     sys.stdout = sys.stderr
     try:
         function, value, arguments = pickle.load(sys.stdin.buffer)
+        threading.Thread(target=_end_with_parent, daemon=True).start()
         result: tuple[str, Any, str] = ("outcomes", function(pickle.loads(value), *arguments), "")
     except Exception as error:
         text = "".join(traceback.format_exception(error))
         try:
-            content = pickle.dumps(error)
+            # Also exceptions that the caller's script defines.
+            content = _dump(error)
         except Exception:
             content = b""
         result = ("error", content, text)
     answers.write(pickle.dumps(result))
     answers.close()
+
+
+def _end_with_parent() -> None:
+    """Ends this process when the one that started it is gone, however it ended."""
+    # Not the buffered reader: its lock would be held at the end of the interpreter.
+    while os.read(0, 4096):
+        pass
+    os._exit(1)

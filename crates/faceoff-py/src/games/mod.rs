@@ -1,7 +1,7 @@
 //! Games of two robots, driven by the Python half: one for PettingZoo, or many for training.
 
+mod game;
 mod rows;
-mod running;
 mod settings;
 mod snapshot;
 
@@ -13,11 +13,11 @@ use crate::{
     pool::{Pool, pool_if_parallel},
     step::Autoreset,
 };
+use game::{GameOrigin, TableGame};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use rows::{GameRow, GameRows, flatten, games_with_rows};
-use running::{GameOrigin, RunningGame};
 use settings::GameSettings;
 use std::sync::Arc;
 
@@ -33,7 +33,7 @@ pub struct Games {
 
 enum State {
     /// Empty before the first reset.
-    Open(Vec<RunningGame>),
+    Open(Vec<TableGame>),
     Closed,
     /// A step panicked.
     Failed,
@@ -79,7 +79,7 @@ impl Games {
             ));
         }
         let settings = &*this.settings;
-        let origin = |seed: Option<u64>, game: Option<&RunningGame>| match (seed, game) {
+        let origin = |seed: Option<u64>, game: Option<&TableGame>| match (seed, game) {
             (Some(seed), _) => GameOrigin { seed, number: 0 },
             (None, previous) => GameOrigin {
                 seed: previous.map_or(0, |game| game.origin.seed),
@@ -87,12 +87,12 @@ impl Games {
             },
         };
         let pool = pool_if_parallel(&mut this.pool)?;
-        let started: Vec<Option<RunningGame>> = py.detach(|| {
+        let started: Vec<Option<TableGame>> = py.detach(|| {
             catch_panic(|| {
                 let start = |index: usize| {
                     let previous = games.get(index);
                     let origin = origin(seeds[index], previous);
-                    mask[index].then(|| RunningGame::start(settings, origin, previous))
+                    mask[index].then(|| TableGame::start(settings, origin, previous))
                 };
                 Ok(match pool {
                     None => (0..mask.len()).map(start).collect(),
@@ -136,7 +136,7 @@ impl Games {
         let pool = pool_if_parallel(&mut this.pool)?;
         let games = this.state.open_games()?;
         check_call_order(games, autoreset)?;
-        let step = |index: usize, game: &mut RunningGame, row: &mut GameRow<'_>| {
+        let step = |index: usize, game: &mut TableGame, row: &mut GameRow<'_>| {
             let own = [0, 1].map(|robot: usize| {
                 let len = lens[robot];
                 slices[robot].map(|actions| &actions[index * len..][..len])
@@ -171,8 +171,8 @@ impl Games {
     fn save(slf: &Bound<'_, Self>, index: usize) -> PyResult<GameSnapshot> {
         let this = &mut *borrow(slf)?;
         let settings = Arc::clone(&this.settings);
-        let running = this.game(index)?.clone();
-        Ok(GameSnapshot { settings, running })
+        let game = this.game(index)?.clone();
+        Ok(GameSnapshot { settings, game })
     }
 
     /// Restores a state that was saved in an environment with the same settings, and writes the game's row. Before the
@@ -196,10 +196,10 @@ impl Games {
         let count = this.count;
         let games = this.state.open_games()?;
         if games.len() == index && index < count {
-            games.push(snapshot.running.clone());
+            games.push(snapshot.game.clone());
         }
         let game = this.game(index)?;
-        game.clone_from(&snapshot.running);
+        game.clone_from(&snapshot.game);
         rows[index].write_start(game);
         Ok(())
     }
@@ -207,7 +207,7 @@ impl Games {
     /// The seed and number of each game.
     fn origins(slf: &Bound<'_, Self>) -> PyResult<Vec<(u64, u32)>> {
         let this = &mut *borrow(slf)?;
-        let origin = |game: &RunningGame| (game.origin.seed, game.origin.number);
+        let origin = |game: &TableGame| (game.origin.seed, game.origin.number);
         Ok(this.state.open_games()?.iter().map(origin).collect())
     }
 
@@ -259,7 +259,7 @@ impl Games {
         Ok(actions)
     }
 
-    fn game(&mut self, index: usize) -> PyResult<&mut RunningGame> {
+    fn game(&mut self, index: usize) -> PyResult<&mut TableGame> {
         let count = self.count;
         let games = self.state.open_games()?;
         if games.is_empty() {
@@ -272,7 +272,7 @@ impl Games {
 }
 
 impl State {
-    fn open_games(&mut self) -> PyResult<&mut Vec<RunningGame>> {
+    fn open_games(&mut self) -> PyResult<&mut Vec<TableGame>> {
         match self {
             Self::Open(games) => Ok(games),
             Self::Closed => Err(ClosedError::new_err(
@@ -287,7 +287,7 @@ impl State {
 fn step_one(
     settings: &GameSettings,
     autoreset: Autoreset,
-    game: &mut RunningGame,
+    game: &mut TableGame,
     actions: [Option<&[f64]>; 2],
     row: &mut GameRow<'_>,
 ) {
@@ -307,7 +307,7 @@ fn step_one(
     }
 }
 
-fn check_call_order(games: &[RunningGame], autoreset: Autoreset) -> PyResult<()> {
+fn check_call_order(games: &[TableGame], autoreset: Autoreset) -> PyResult<()> {
     if games.is_empty() {
         return Err(missing_reset_error());
     }

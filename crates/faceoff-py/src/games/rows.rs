@@ -1,7 +1,7 @@
-//! Output arrays of the games' steps, a row per game, in memory of Python. The *facts* of a game are 22 numbers about its
+//! Output arrays of the games' steps, a row per game, in memory of Python. The *facts* of a game are 23 numbers about its
 //! last step.
 
-use super::running::RunningGame;
+use super::game::TableGame;
 use crate::{errors::argument_error, observation};
 use faceoff_sim::{
     Game, GameState, GameStep, JOINTS, RallyEnd,
@@ -15,7 +15,7 @@ use rayon::prelude::*;
 pub const RALLY_ENDS: [&str; 5] = ["goal", "foul", "stuck", "left_table", "diverged"];
 
 /// Count of numbers in a game's row of facts; see [`GameRow::write_facts`].
-pub const GAME_FACTS: usize = 22;
+pub const GAME_FACTS: usize = 23;
 
 /// Count of numbers in a true state: the puck's 6 in the table frame; for each robot its joint positions and velocities (7
 /// each), and the end effector's 3 in its own base frame.
@@ -86,31 +86,31 @@ impl GameRows<'_> {
 
 impl GameRow<'_> {
     /// Writes the row of a game that was started or restored.
-    pub fn write_start(&mut self, running: &RunningGame) {
-        write_both(&running.game, self.observations);
-        self.state.copy_from_slice(&flatten(&running.game.state()));
+    pub fn write_start(&mut self, game: &TableGame) {
+        write_both(&game.game, self.observations);
+        self.state.copy_from_slice(&flatten(&game.game.state()));
         self.facts.fill(0.0);
         self.facts[..2].fill(-1.0);
-        self.write_counts(running, [0; 2]);
+        self.write_counts(game, [0; 2]);
     }
 
     /// Writes the row of a game after a step that gained these points for each side.
-    pub fn write_step(&mut self, running: &RunningGame, step: &GameStep, points: [u32; 2]) {
-        write_both(&running.game, self.observations);
+    pub fn write_step(&mut self, game: &TableGame, step: &GameStep, points: [u32; 2]) {
+        write_both(&game.game, self.observations);
         self.state.copy_from_slice(&flatten(&step.state));
-        self.write_facts(running, step, points);
+        self.write_facts(game, step, points);
     }
 
     /// Writes the observations of a new game; those of the game before it become the final ones.
-    pub fn write_successor(&mut self, next: &RunningGame) {
+    pub fn write_successor(&mut self, next: &TableGame) {
         self.final_observations.copy_from_slice(self.observations);
         write_both(&next.game, self.observations);
     }
 
     /// Code of the rally's end in [`RALLY_ENDS`] and the robot that brought it about (−1: none), 2 × 4 constraint values (ee,
     /// link, joint_pos, joint_vel), whether each robot has made the world diverge, goals, fouls, score, points of the
-    /// step, control steps of the game, and its number.
-    fn write_facts(&mut self, running: &RunningGame, step: &GameStep, points: [u32; 2]) {
+    /// step, control steps of the game, its number, and whether it is over.
+    fn write_facts(&mut self, game: &TableGame, step: &GameStep, points: [u32; 2]) {
         let (code, by) = match step.rally_end {
             None => (-1.0, None),
             Some(RallyEnd::Goal { by }) => (0.0, Some(by)),
@@ -134,17 +134,18 @@ impl GameRow<'_> {
         for (fact, has_diverged) in self.facts[10..12].iter_mut().zip(diverged) {
             *fact = f64::from(u8::from(has_diverged));
         }
-        self.write_counts(running, points);
+        self.write_counts(game, points);
     }
 
-    fn write_counts(&mut self, running: &RunningGame, points: [u32; 2]) {
-        let referee = running.game.referee();
+    fn write_counts(&mut self, game: &TableGame, points: [u32; 2]) {
+        let referee = game.game.referee();
         let counts = [referee.goals, referee.fouls, referee.score(), points];
         for (fact, count) in self.facts[12..20].iter_mut().zip(counts.concat()) {
             *fact = f64::from(count);
         }
-        self.facts[20] = f64::from(running.game.steps());
-        self.facts[21] = f64::from(running.origin.number);
+        self.facts[20] = f64::from(game.game.steps());
+        self.facts[21] = f64::from(game.origin.number);
+        self.facts[22] = f64::from(u8::from(game.is_over));
     }
 }
 
@@ -166,8 +167,8 @@ pub fn flatten(state: &GameState) -> Vec<f64> {
 
 /// Games with their rows, for parallel processing.
 pub fn games_with_rows<'a, 'g, 'r>(
-    games: &'g mut [RunningGame],
+    games: &'g mut [TableGame],
     rows: &'a mut [GameRow<'r>],
-) -> impl IndexedParallelIterator<Item = (&'g mut RunningGame, &'a mut GameRow<'r>)> {
+) -> impl IndexedParallelIterator<Item = (&'g mut TableGame, &'a mut GameRow<'r>)> {
     games.par_iter_mut().zip(rows.par_iter_mut())
 }

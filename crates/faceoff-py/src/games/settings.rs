@@ -2,8 +2,7 @@
 
 use crate::{
     actions::{ActionFormat, ActionMode},
-    errors::argument_error,
-    setup::check_magnitudes,
+    setup::{check_magnitudes, read_json},
 };
 use faceoff_sim::{Factor, Factors, GameSetup, Interpolation, PerturbationSettings, Plant};
 use faceoff_types::Seed;
@@ -33,8 +32,7 @@ impl GameSettings {
     /// # Errors
     /// If they are invalid.
     pub fn read(json: &str) -> PyResult<Self> {
-        let settings: Self = serde_json::from_str(json)
-            .map_err(|error| argument_error("setup", "a setup in JSON", error))?;
+        let settings: Self = read_json(json)?;
         check_magnitudes(&settings.factors, &settings.perturbations)?;
         Ok(settings)
     }

@@ -1,7 +1,7 @@
 //! Saved states of games.
 
 use super::{
-    running::{GameOrigin, RunningGame},
+    game::{GameOrigin, TableGame},
     settings::GameSettings,
 };
 use crate::errors::{argument_error, catch_panic};
@@ -21,7 +21,7 @@ use std::sync::Arc;
 #[pyclass(frozen, module = "faceoff._native")]
 pub struct GameSnapshot {
     pub settings: Arc<GameSettings>,
-    pub running: RunningGame,
+    pub game: TableGame,
 }
 
 /// What a pickled state contains.
@@ -50,27 +50,27 @@ impl GameSnapshot {
     /// The seed of the game.
     #[getter]
     fn seed(&self) -> u64 {
-        self.running.origin.seed
+        self.game.origin.seed
     }
 
     /// The game's number among those of its seed.
     #[getter]
     fn game_number(&self) -> u32 {
-        self.running.origin.number
+        self.game.origin.number
     }
 
     /// Control steps of the game so far.
     #[getter]
     fn steps(&self) -> u32 {
-        self.running.game.steps()
+        self.game.game.steps()
     }
 
     fn __repr__(&self) -> String {
         format!(
             "<state of a game: seed {}, game {}, step {}>",
-            self.running.origin.seed,
-            self.running.origin.number,
-            self.running.game.steps()
+            self.game.origin.seed,
+            self.game.origin.number,
+            self.game.game.steps()
         )
     }
 
@@ -87,26 +87,26 @@ impl GameSnapshot {
         &self,
         py: Python<'py>,
     ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
-        let running = &self.running;
+        let game = &self.game;
         let GameProgress {
             rally,
             steps,
             referee,
             violations,
-        } = &running.rally_start;
+        } = &game.rally_start;
         let saved = SavedGame {
             faceoff: env!("CARGO_PKG_VERSION").to_owned(),
             settings: GameSettings::clone(&self.settings),
-            seed: running.origin.seed,
-            number: running.origin.number,
-            is_over: running.is_over,
+            seed: game.origin.seed,
+            number: game.origin.number,
+            is_over: game.is_over,
             rally: *rally,
             steps: *steps,
             goals: referee.goals,
             fouls: referee.fouls,
             serving_robot: referee.serving_robot,
             violations: violations.map(|v| [v.ee, v.link, v.joint_pos, v.joint_vel]),
-            actions: running
+            actions: game
                 .actions
                 .iter()
                 .map(|number| (!number.is_nan()).then_some(*number))
@@ -173,11 +173,11 @@ pub fn load_game(py: Python<'_>, data: &[u8]) -> PyResult<GameSnapshot> {
         .iter()
         .map(|number| number.unwrap_or(f64::NAN))
         .collect();
-    let replay = || RunningGame::replay(&settings, origin, &progress, &actions);
-    let mut running = py.detach(|| catch_panic(replay))?;
-    running.is_over = saved.is_over;
+    let replay = || TableGame::replay(&settings, origin, &progress, &actions);
+    let mut game = py.detach(|| catch_panic(replay))?;
+    game.is_over = saved.is_over;
     Ok(GameSnapshot {
         settings: Arc::new(settings),
-        running,
+        game,
     })
 }

@@ -8,7 +8,7 @@
     arrays = dataset.episode("hit", 0).to_numpy()
 
 Needs pyarrow 12 or newer (``pip install 'faceoff-robotics[dataset]'``); pandas, polars and minari only for the
-functions that use them. The simulator is not needed: this package never imports ``faceoff._native``.
+functions that use them. The simulator is not needed, except by ``to_minari``.
 ``python -m faceoff.dataset`` does the same from the command line. The layouts are described in
 ``docs/dataset.md``.
 """

@@ -11,6 +11,8 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from faceoff.errors import ArgumentError, ArgumentTypeError
+
 from ._dataset import Dataset
 from ._errors import ExistsError
 from ._game import Game
@@ -24,6 +26,8 @@ OPTIONS: dict[str, Any] = {
     "compression": "snappy",
     "use_dictionary": False,
 }
+#: The entry with the schema of Arrow, which the writer makes itself.
+ARROW_SCHEMA = b"ARROW:schema"
 #: Rows that are in memory at once.
 BATCH_ROWS = 65_536
 
@@ -45,12 +49,20 @@ def to_parquet(recording: Dataset | Game, out: str | os.PathLike[str]) -> list[P
         DatasetError: the recording is damaged.
         ExistsError: `out` exists already.
     """
-    folder = Path(out)
-    if folder.exists():
+    if not isinstance(recording, (Dataset, Game)):
+        raise ArgumentTypeError(f"recording: expected what faceoff.dataset.open returns, got {recording!r:.80}")
+    try:
+        folder = Path(out)
+    except TypeError:
+        raise ArgumentTypeError(f"out: expected a path, got {out!r:.80}") from None
+    if os.path.lexists(folder):
         raise ExistsError(f"out: {folder} is there already; name another folder")
     recording.check()
     names = [name for name in recording.manifest["files"] if name.endswith(".parquet")]
-    folder.absolute().parent.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.absolute().parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ArgumentError(f"out: expected a folder that can be created, got {folder}: {error}") from None
     # Written beside it, so that after an error no half of it is left under its name.
     unfinished = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.absolute().parent))
     try:
@@ -65,7 +77,9 @@ def to_parquet(recording: Dataset | Game, out: str | os.PathLike[str]) -> list[P
 
 
 def _rewrite(table: pq.ParquetFile, target: Path) -> None:
-    schema = _signed(table.schema_arrow)
+    # The layout's name is in the metadata of the file, not of the schema.
+    metadata = {key: value for key, value in (table.metadata.metadata or {}).items() if key != ARROW_SCHEMA}
+    schema = _signed(table.schema_arrow).with_metadata(metadata)
     with pq.ParquetWriter(target, schema, **OPTIONS) as writer:
         for batch in table.iter_batches(batch_size=BATCH_ROWS):
             writer.write_table(pa.Table.from_batches([batch]).cast(schema))
@@ -76,4 +90,4 @@ def _signed(schema: pa.Schema) -> pa.Schema:
     fields = [
         field.with_type(pa.int64()) if pa.types.is_unsigned_integer(field.type) else field for field in schema
     ]
-    return pa.schema(fields, metadata=schema.metadata)
+    return pa.schema(fields)

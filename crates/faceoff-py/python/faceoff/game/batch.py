@@ -104,7 +104,7 @@ class GameRows:
     observations: Observation
     #: (games, 2, 23), float32: last observations of games whose successor has begun in the same step.
     final_observations: Observation
-    #: (games, 22): see the properties below.
+    #: (games, 23): see the properties below.
     facts: Floats
     #: (games, 40): true states after the step.
     states: Floats
@@ -121,10 +121,6 @@ class GameRows:
             np.zeros((games, _native.GAME_STATE_LEN)),
             np.zeros((games, 2)),
         )
-
-    def renew(self) -> None:
-        """Allocates a new array for the observations, which callers keep."""
-        self.observations = self.observations.copy()
 
     def arrays(self) -> tuple[Any, ...]:
         """The arrays as the native half expects them."""
@@ -193,14 +189,19 @@ class GameRows:
         """[games] the game's number; at its end that of the ended game."""
         return self.facts[:, 21].astype(np.int64)
 
+    @property
+    def is_over(self) -> Bools:
+        """[games] whether the step ended the game."""
+        return self.facts[:, 22] > 0.0
+
 
 class GameBatch:
     """Games with the same arguments, and the arrays of their last step. It can be pickled and copied."""
 
-    def __init__(self, arguments: GameArguments, games: int, *, threads: int, autoreset: str, copy: bool) -> None:
+    def __init__(self, arguments: GameArguments, games: int, *, threads: int, autoreset: str) -> None:
         self.arguments = arguments
         self.games = games
-        self.copy = copy
+        #: Overwritten by each step and reset; environments hand out copies, so that callers may change them.
         self.rows = GameRows.make(games)
         self._threads = threads
         self._autoreset = autoreset
@@ -223,10 +224,7 @@ class GameBatch:
 
     def reset(self, mask: Bools, seeds: Sequence[int | None]) -> None:
         """Begins the games of the mask: the first one of a seed, or the next one of the last seed."""
-        native = self.native
-        if self.copy:
-            self.rows.renew()
-        native.reset(mask, list(seeds), self.rows.arrays())
+        self.native.reset(mask, list(seeds), self.rows.arrays())
         self.rows.rewards[mask] = 0.0
 
     def step(self, actions: Sequence[Floats | None]) -> None:
@@ -235,8 +233,6 @@ class GameBatch:
         before = rows.observations
         if self.arguments.reward is not default_reward:
             before = before.copy()
-        if self.copy:
-            rows.renew()
         native.step(list(actions), rows.arrays())
         rows.rewards = self._rewards(before)
 
@@ -245,8 +241,7 @@ class GameBatch:
         started = rows.steps == 0
         after = rows.observations
         if self._autoreset == "same_step":
-            over = self.is_over
-            after = np.where(over[:, None, None], rows.final_observations, after)
+            after = np.where(rows.is_over[:, None, None], rows.final_observations, after)
         transition = GameTransition(
             observations=before,
             next_observations=after,
@@ -263,18 +258,7 @@ class GameBatch:
         return rewards
 
     def _call_reward(self, transition: GameTransition) -> Floats:
-        rewards = np.array(self.arguments.reward(transition), np.float64)
-        if rewards.shape != (self.games, 2) or not np.isfinite(rewards).all():
-            raise ArgumentError(
-                f"reward: expected a function that returns finite numbers of shape ({self.games}, 2), "
-                f"got {rewards!r:.80}"
-            )
-        return rewards
-
-    @property
-    def is_over(self) -> Bools:
-        """[games] whether the step ended the game."""
-        return (self.rows.steps >= self.arguments.max_steps) | self.rows.diverged.any(axis=1)
+        return read_rewards(self.arguments.reward(transition), (self.games, 2))
 
     def close(self) -> None:
         """Releases the games; may be called more than once."""
@@ -316,10 +300,21 @@ class SingleGameBatch(GameBatch):
             points=transition.points[0],
             diverged=transition.diverged[0],
         )
-        rewards = np.array(self.arguments.reward(single), np.float64)
-        if rewards.shape != (2,) or not np.isfinite(rewards).all():
-            raise ArgumentError(f"reward: expected a function that returns two finite numbers, got {rewards!r:.80}")
-        return rewards[None]
+        return read_rewards(self.arguments.reward(single), (2,))[None]
+
+
+def read_rewards(value: object, shape: tuple[int, ...]) -> Floats:
+    """The result of a reward function as a new array of this shape; refused unless it consists of finite numbers."""
+    expected = f"reward: expected a function that returns finite numbers of shape {shape}"
+    try:
+        array = np.asarray(value)
+    except (ValueError, TypeError, RuntimeError) as error:
+        raise ArgumentError(f"{expected}, got {error}") from None
+    if array.dtype.kind not in "fiub":
+        raise ArgumentTypeError(f"{expected}, got {value!r:.80}")
+    if array.shape != shape or not np.isfinite(array).all():
+        raise ArgumentError(f"{expected}, got {value!r:.80}")
+    return array.astype(np.float64)
 
 
 def agent_of(robot: int) -> str | None:

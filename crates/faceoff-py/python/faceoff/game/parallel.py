@@ -16,6 +16,7 @@ from faceoff.errors import ArgumentError, ArgumentTypeError, OrderError
 from faceoff.game.batch import GameArguments, Interpolations, SingleGameBatch, agent_of
 from faceoff.game.render import GameView
 from faceoff.game.transition import AGENTS, GAME_STEPS, GameReward, Observation
+from faceoff.gym.call_guard import CallGuard, exclusive
 from faceoff.gym.spaces import game_observation_space
 
 
@@ -69,13 +70,14 @@ class AirHockeyGame(ParallelEnv[str, Observation, Any]):  # type: ignore[misc]
         )
         if render_mode is not None:
             one_of("render_mode", render_mode, self.metadata["render_modes"])
-        self._batch = SingleGameBatch(arguments, 1, threads=1, autoreset="disabled", copy=True)
+        self._batch = SingleGameBatch(arguments, 1, threads=1, autoreset="disabled")
         self.render_mode = render_mode
         self.possible_agents = list(AGENTS)
         self.agents: list[str] = []
         self._observation_spaces = {agent: game_observation_space() for agent in AGENTS}
         self._action_spaces: dict[str, gymnasium.spaces.Box] = dict(zip(AGENTS, arguments.action_spaces(), strict=True))
         self._seed: int | None = None
+        self._calls = CallGuard()
         self._view = GameView("faceoff game", render_mode, self.metadata["render_fps"])
 
     def observation_space(self, agent: str) -> gymnasium.spaces.Box:
@@ -86,6 +88,7 @@ class AirHockeyGame(ParallelEnv[str, Observation, Any]):  # type: ignore[misc]
         """(n,) float32 by the agent's interpolation; the same object on each call."""
         return self._action_spaces[one_of("agent", agent, AGENTS)]
 
+    @exclusive
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
@@ -104,6 +107,7 @@ class AirHockeyGame(ParallelEnv[str, Observation, Any]):  # type: ignore[misc]
         info = {"seed": self._seed, "game_number": number}
         return self._observations_of(self.agents), {agent: dict(info) for agent in self.agents}
 
+    @exclusive
     def step(
         self, actions: dict[str, Any]
     ) -> tuple[
@@ -173,6 +177,7 @@ class AirHockeyGame(ParallelEnv[str, Observation, Any]):  # type: ignore[misc]
             info["rally_end_by"] = agent_of(int(rows.by[0]))
         return info
 
+    @exclusive
     def render(self) -> npt.NDArray[np.uint8] | None:
         """A picture of the table from above, (360, 640, 3) uint8; None for ``human``, which shows a window."""
         return self._view.show(self._batch.native.state(0))

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import gymnasium
+import numpy as np
 
 from faceoff._arguments import integer, known_names, one_of, seed_number
 from faceoff.errors import ArgumentError, ArgumentTypeError
@@ -63,26 +64,38 @@ class SelfPlayEnv(gymnasium.Env[Any, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Begins a game. ``options={"opponent": i}`` selects an opponent; info has ``opponent`` and ``side``."""
+        """Begins a game. ``options={"opponent": i}`` selects an opponent; info has ``opponent`` and ``side``.
+
+        By default opponent and random side follow from the game's seed and number.
+        """
         if seed is not None:
-            seed_number("seed", seed)
-        super().reset(seed=seed)
+            seed = seed_number("seed", seed)
         check_pool(self.opponents)
-        index = (options or {}).get("opponent")
-        if index is None:
-            index = int(self.np_random.integers(len(self.opponents)))
-        index = integer("options['opponent']", index, 0, len(self.opponents) - 1)
-        if self._side == "random":
-            self._own = AGENTS[int(self.np_random.integers(2))]
-            self._other = _other(self._own)
+        chosen = self._read_opponent(options)
+        super().reset(seed=seed)
         if seed is None and self.game._seed is None:
             seed = int(self.np_random.integers(2**63))
+        self._observations, infos = self.game.reset(seed=seed)
+        index, robot = draw_opponent(infos[AGENTS[0]]["seed"], infos[AGENTS[0]]["game_number"], len(self.opponents))
+        index = index if chosen is None else chosen
+        if self._side == "random":
+            self._own, self._other = AGENTS[robot], AGENTS[1 - robot]
         self._opponent = self.opponents[index]
         reset_opponent = getattr(self._opponent, "reset", None)
         if reset_opponent is not None:
             reset_opponent()
-        self._observations, infos = self.game.reset(seed=seed)
         return self._observations[self._own], infos[self._own] | {"opponent": index, "side": self._own}
+
+    def _read_opponent(self, options: object) -> int | None:
+        if options is None:
+            return None
+        if not isinstance(options, Mapping):
+            raise ArgumentTypeError(f"options: expected a mapping with opponent, got {options!r:.80}")
+        unknown = [name for name in options if name != "opponent"]
+        if unknown:
+            raise ArgumentError(f"options: expected opponent, got {unknown[0]!r}")
+        index = options.get("opponent")
+        return None if index is None else integer("options['opponent']", index, 0, len(self.opponents) - 1)
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """One control step of both robots; reward and info are those of the own side."""
@@ -96,7 +109,7 @@ class SelfPlayEnv(gymnasium.Env[Any, Any]):
 
     def __copy__(self) -> SelfPlayEnv:
         # Opponents are functions: copies share them, not the list.
-        return copy.deepcopy(self, {id(opponent): opponent for opponent in self.opponents})
+        return copy.deepcopy(self, {id(opponent): opponent for opponent in [*self.opponents, self._opponent]})
 
     def render(self) -> Any:
         """As :meth:`AirHockeyGame.render`."""
@@ -109,6 +122,12 @@ class SelfPlayEnv(gymnasium.Env[Any, Any]):
 
 def _other(agent: str) -> str:
     return AGENTS[1 - AGENTS.index(agent)]
+
+
+def draw_opponent(seed: int, game_number: int, opponents: int) -> tuple[int, int]:
+    """The opponent's index and the own robot, 0 or 1, of a game: they follow from its seed and number."""
+    random = np.random.default_rng([seed, game_number])
+    return int(random.integers(opponents)), int(random.integers(2))
 
 
 def read_pool(opponents: object) -> list[Any]:

@@ -15,7 +15,7 @@ from faceoff._arguments import flag, integer, known_names, mask, numbers, one_of
 from faceoff.errors import ArgumentError
 from faceoff.game.batch import GAME_ARGUMENTS, GameArguments, GameBatch, agent_of
 from faceoff.game.render import draw_game
-from faceoff.game.self_play import check_pool, read_pool
+from faceoff.game.self_play import check_pool, draw_opponent, read_pool
 from faceoff.game.transition import AGENTS, Observation
 from faceoff.gym.call_guard import CallGuard, exclusive
 from faceoff.gym.spaces import game_observation_space
@@ -66,7 +66,7 @@ class _GameVectorEnv(VectorEnv[Any, Any, Any]):
             "autoreset_mode": self.autoreset_mode,
         }
         mode = self.autoreset_mode.name.lower()
-        self._batch = GameBatch(self._arguments, games, threads=count, autoreset=mode, copy=self.copy)
+        self._batch = GameBatch(self._arguments, games, threads=count, autoreset=mode)
         self._calls = CallGuard()
         self._seeds = np.zeros(games, np.int64)
 
@@ -79,7 +79,10 @@ class _GameVectorEnv(VectorEnv[Any, Any, Any]):
     def _observations(self, rows: Observation) -> Observation:
         raise NotImplementedError
 
-    def _games_begin(self, games: Bools) -> dict[str, Any]:
+    def _check(self) -> None:
+        """Called before a step or reset, so that what is refused changes nothing."""
+
+    def _games_begin(self, games: Bools, numbers_of_games: npt.NDArray[np.int64]) -> dict[str, Any]:
         """Called when games begin; returns infos about them, without masks."""
         return {}
 
@@ -104,9 +107,10 @@ class _GameVectorEnv(VectorEnv[Any, Any, Any]):
         """
         batch = self._batch
         is_started = batch.is_started
+        self._check()
         is_reset = self._read_mask(options)
         seeds = read_seeds(seed, batch.games, "games")
-        super().reset(seed=int(seed) if isinstance(seed, (int, np.integer)) else None)
+        super().reset(seed=seeds[0] if np.ndim(seed) == 0 else None)  # type: ignore[arg-type]
         if not is_started:
             fallback = self.np_random.integers(2**63, size=batch.games).tolist()
             seeds = [new if given is None else given for given, new in zip(seeds, fallback, strict=True)]
@@ -114,8 +118,11 @@ class _GameVectorEnv(VectorEnv[Any, Any, Any]):
         origins = np.array(batch.native.origins(), np.uint64).astype(np.int64)
         self._seeds = origins[:, 0].copy()
         infos = self._start_infos(is_reset, origins[:, 1])
-        observations = self._observations(batch.rows.observations)
-        return observations.copy() if self.copy else observations, infos
+        return self._result(batch.rows.observations), infos
+
+    def _result(self, rows: Observation) -> Observation:
+        observations = self._observations(rows)
+        return observations.copy() if self.copy else observations
 
     def _read_mask(self, options: object) -> Bools:
         if options is None:
@@ -130,7 +137,7 @@ class _GameVectorEnv(VectorEnv[Any, Any, Any]):
         return mask("options['reset_mask']", options["reset_mask"], self._batch.games)
 
     def _start_infos(self, begun: Bools, numbers_of_games: npt.NDArray[np.int64]) -> dict[str, Any]:
-        values = {"seed": self._seeds, "game_number": numbers_of_games, **self._games_begin(begun)}
+        values = {"seed": self._seeds, "game_number": numbers_of_games, **self._games_begin(begun, numbers_of_games)}
         rows = begun[self._game_of]
         infos: dict[str, Any] = {}
         for name, value in values.items():
@@ -150,9 +157,10 @@ class _GameVectorEnv(VectorEnv[Any, Any, Any]):
         """
         batch = self._batch
         batch.native  # noqa: B018 - the error about a closed environment comes first
+        self._check()
         batch.step(self._actions_of_both(actions))
         rows = batch.rows
-        is_over, is_new = batch.is_over, rows.steps == 0
+        is_over, is_new = rows.is_over, rows.steps == 0
         diverged = rows.diverged[self._game_of, self._robot_of]
         terminated = diverged & is_over[self._game_of]
         truncated = is_over[self._game_of] & ~terminated
@@ -173,7 +181,7 @@ class _GameVectorEnv(VectorEnv[Any, Any, Any]):
         begun = is_new | is_over if self.autoreset_mode.name == "SAME_STEP" else is_new
         if begun.any():
             infos |= self._start_infos(begun, rows.numbers + (is_over & begun))
-        return self._observations(rows.observations), rewards, terminated, truncated, infos
+        return self._result(rows.observations), rewards, terminated, truncated, infos
 
     def _step_infos(self, games: Bools) -> dict[str, Any]:
         rows = self._batch.rows
@@ -212,7 +220,8 @@ class _GameVectorEnv(VectorEnv[Any, Any, Any]):
 
     def __copy__(self) -> _GameVectorEnv:
         # Opponents are functions: copies share them, not the list.
-        return deepcopy(self, {id(opponent): opponent for opponent in getattr(self, "opponents", [])})
+        shared = [*getattr(self, "opponents", []), *getattr(self, "_opponent_of", [])]
+        return deepcopy(self, {id(opponent): opponent for opponent in shared})
 
     def close_extras(self, **kwargs: Any) -> None:
         """Releases games and threads; called by ``close``."""
@@ -230,7 +239,7 @@ class AirHockeyGameVectorEnv(_GameVectorEnv):
         games: number of games.
         max_steps: control steps of a game; the default is one minute.
         autoreset_mode: as for :class:`faceoff.gym.AirHockeyVectorEnv`; both rows of a game end together.
-        copy: whether each step returns new observations. Otherwise they are the same array each time, overwritten by
+        copy: whether each step returns new observations. Otherwise they may be the same memory each time, overwritten by
             the next step or reset.
         threads: threads of this environment's pool; by default one per CPU that this process may use. Results do not
             depend on it.
@@ -291,8 +300,9 @@ class SelfPlayVectorEnv(_GameVectorEnv):
         max_steps, autoreset_mode, copy, threads, render_mode, game_arguments: as for
             :class:`AirHockeyGameVectorEnv`; with a fixed side the robots may have different action spaces.
 
-    The pool may grow during training: ``env.unwrapped.opponents.append(policy)`` takes effect in games that begin later.
-    Infos of a new game have ``opponent`` and ``side``.
+    Opponent and random side of a game follow from its seed and number, and stay until its end. The pool may change during
+    training: ``env.unwrapped.opponents.append(policy)`` takes effect in games that begin later. Infos of a new game have
+    ``opponent`` and ``side``.
     """
 
     def __init__(
@@ -328,20 +338,33 @@ class SelfPlayVectorEnv(_GameVectorEnv):
         self._action_lens = [space.shape[0] for space in spaces]
         self._game_of = np.arange(self.num_envs)
         self._robot_of = np.full(self.num_envs, own)
-        self._opponent_of = np.zeros(self.num_envs, np.int64)
+        #: The opponent of each game, from its begin to its end, whatever happens to the pool; and its index then.
+        self._opponent_of = np.full(self.num_envs, self.opponents[0], object)
+        self._index_of = np.zeros(self.num_envs, np.int64)
 
-    def _games_begin(self, games: Bools) -> dict[str, Any]:
+    def _check(self) -> None:
         check_pool(self.opponents)
+
+    def _games_begin(self, games: Bools, numbers_of_games: npt.NDArray[np.int64]) -> dict[str, Any]:
         begun = np.flatnonzero(games)
-        self._opponent_of[begun] = self.np_random.integers(len(self.opponents), size=len(begun))
-        if self._side == "random":
-            self._robot_of[begun] = self.np_random.integers(2, size=len(begun))
-        for index, opponent in enumerate(self.opponents):
-            own = begun[self._opponent_of[begun] == index]
+        for game in begun:
+            drawn = draw_opponent(int(self._seeds[game]), int(numbers_of_games[game]), len(self.opponents))
+            self._index_of[game], robot = drawn
+            self._opponent_of[game] = self.opponents[drawn[0]]
+            if self._side == "random":
+                self._robot_of[game] = robot
+        for opponent, own in self._by_opponent(begun):
             reset = getattr(opponent, "reset", None)
-            if reset is not None and len(own) > 0:
+            if reset is not None:
                 reset(own)
-        return {"opponent": self._opponent_of, "side": np.array(AGENTS, object)[self._robot_of]}
+        return {"opponent": self._index_of, "side": np.array(AGENTS, object)[self._robot_of]}
+
+    def _by_opponent(self, games: npt.NDArray[np.int64]) -> list[tuple[BatchOpponent, npt.NDArray[np.int64]]]:
+        """The games of each opponent among these, in the order of their first game."""
+        groups: dict[int, list[int]] = {}
+        for game in games.tolist():
+            groups.setdefault(id(self._opponent_of[game]), []).append(game)
+        return [(self._opponent_of[group[0]], np.array(group)) for group in groups.values()]
 
     def _observations(self, rows: Observation) -> Observation:
         if self._side == "random":
@@ -350,15 +373,15 @@ class SelfPlayVectorEnv(_GameVectorEnv):
 
     def _actions_of_both(self, actions: Any) -> Sequence[Floats]:
         checked = numbers("actions", actions, self.action_space.shape)  # type: ignore[arg-type]
-        observations = self._batch.rows.observations
+        rows = self._batch.rows
+        # In this step the next game begins where one is over, without actions.
+        begins = rows.is_over & (self.autoreset_mode.name == "NEXT_STEP")
         of_robots = [np.zeros((self.num_envs, length)) for length in self._action_lens]
         for robot, of_robot in enumerate(of_robots):
             own = self._robot_of == robot
             if own.any():
                 of_robot[own] = checked[own]
-            for index in np.unique(self._opponent_of[~own]):
-                games = np.flatnonzero(~own & (self._opponent_of == index))
-                answer = self.opponents[index](observations[games, robot])
-                name, shape = f"actions of opponents[{index}]", (len(games), of_robot.shape[1])
-                of_robot[games] = numbers(name, answer, shape)
+            for opponent, games in self._by_opponent(np.flatnonzero(~own & ~begins)):
+                name = f"actions of opponents[{self._index_of[games[0]]}]"
+                of_robot[games] = numbers(name, opponent(rows.observations[games, robot]), (len(games), of_robot.shape[1]))
         return of_robots

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import gymnasium
 import numpy as np
 import numpy.typing as npt
-from gymnasium.wrappers import TimeLimit
+from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker, TimeLimit
 
 from faceoff import _native
 from faceoff._arguments import (
@@ -124,35 +124,28 @@ class AirHockeyEnv(gymnasium.Env[Any, Any]):
         if seed is not None:
             seed = seed_number("seed", seed)
         number, puck = read_options(options)
-        limit = time_limit_of(self)
-        if limit is not None:
-            worlds, seed, number = self._limited(limit, seed, number)
         super().reset(seed=seed)
         if seed is None and not self._is_started:
             seed = int(self.np_random.integers(2**63))
+        setup = self._setup_with(find_time_limit(self))
+        if setup != self._setup:
+            worlds = _native.Worlds(setup, 1, 1, "disabled")
+            if seed is None:
+                # New worlds do not know which episode was the last one.
+                [(seed, last)] = self._require_worlds().origins()
+                number = last + 1 if number is None else number
         all_worlds = np.ones(1, np.bool_)
         worlds.reset(all_worlds, [seed], number, puck, self._rows.arrays())
+        self._worlds, self._setup = worlds, setup
         self._is_started = True
         self._render_human()
         return self._rows.observations[0].copy(), self._origin()
 
-    def _limited(
-        self, steps: int, seed: int | None, number: int | None
-    ) -> tuple[_native.Worlds, int | None, int | None]:
-        """Worlds whose episodes have at most this many steps; and the seed and number of the next episode."""
-        worlds = self._require_worlds()
+    def _setup_with(self, time_limit: int | None) -> str:
+        """The setup of worlds whose episodes also end after this many steps."""
         own = self._arguments["max_episode_steps"]
-        setup = write_setup(**self._arguments | {"max_episode_steps": steps if own is None else min(steps, int(own))})
-        if setup == self._setup:
-            return worlds, seed, number
-        if seed is None and self._is_started:
-            # New worlds do not know which episode was the last one.
-            [(seed, last)] = worlds.origins()
-            number = last + 1 if number is None else number
-        worlds.close()
-        self._setup = setup
-        self._worlds = _native.Worlds(setup, 1, 1, "disabled")
-        return self._worlds, seed, number
+        limits = [int(steps) for steps in (own, time_limit) if steps is not None]
+        return write_setup(**self._arguments | {"max_episode_steps": min(limits, default=None)})
 
     @exclusive
     def step(
@@ -206,8 +199,12 @@ class AirHockeyEnv(gymnasium.Env[Any, Any]):
         """
         if not isinstance(state, _native.Snapshot):
             raise ArgumentTypeError(f"state: expected what save() returned, got {state!r:.80}")
-        self._require_worlds().restore(0, state, self._rows.arrays())
-        self._is_started = True
+        worlds = self._require_worlds()
+        setup = self._setup_with(state.max_episode_steps)
+        if setup != self._setup:
+            worlds = _native.Worlds(setup, 1, 1, "disabled")
+        worlds.restore(0, state, self._rows.arrays())
+        self._worlds, self._setup, self._is_started = worlds, setup, True
         return self._rows.observations[0].copy(), self._origin()
 
     @property
@@ -267,20 +264,28 @@ class AirHockeyEnv(gymnasium.Env[Any, Any]):
             self.restore(saved)
 
 
-def time_limit_of(env: AirHockeyEnv) -> int | None:
-    """The number of steps of Gymnasium's ``TimeLimit`` around this environment, whose ``reset`` is under way.
+def find_time_limit(env: AirHockeyEnv) -> int | None:
+    """The number of steps of the ``TimeLimit`` of ``gymnasium.make`` around this environment, whose ``reset`` is under way.
 
-    ``gymnasium.make(max_episode_steps=…)`` does not hand its argument to the environment, but wraps it. The environment must
+    ``make(max_episode_steps=…)`` does not hand its argument to the environment, but wraps it. The environment must
     know the limit, because the last step's info says how the episode ended. A wrapper around it is a caller of this call.
+    A limit around other wrappers is none of the environment's: they may repeat actions.
     """
-    limits = []
     frame = sys._getframe(1)
     while frame is not None:
         wrapper = frame.f_locals.get("self") if frame.f_code.co_name == "reset" else None
-        if isinstance(wrapper, TimeLimit) and wrapper.unwrapped is env:
-            limits.append(integer("max_episode_steps", wrapper._max_episode_steps, 1, _native.EPISODE_STEPS))
+        if isinstance(wrapper, TimeLimit) and _wraps_directly(wrapper, env):
+            return integer("max_episode_steps", wrapper._max_episode_steps, 1, _native.EPISODE_STEPS)
         frame = frame.f_back  # type: ignore[assignment]
-    return min(limits) if limits else None
+    return None
+
+
+def _wraps_directly(wrapper: gymnasium.Env[Any, Any], env: AirHockeyEnv) -> bool:
+    """Whether there are only checks between them, which ``gymnasium.make`` adds."""
+    inner = wrapper.env  # type: ignore[attr-defined]
+    while isinstance(inner, (OrderEnforcing, PassiveEnvChecker)):
+        inner = inner.env
+    return inner is env
 
 
 def read_options(options: Mapping[str, Any] | None) -> tuple[int | None, list[float] | None]:

@@ -49,7 +49,6 @@ class Rows:
 
     def renew(self) -> None:
         """Allocates new arrays for the results that callers keep."""
-        self.observations = np.empty_like(self.observations)
         self.rewards = np.empty_like(self.rewards)
         self.terminated = np.empty_like(self.terminated)
         self.truncated = np.empty_like(self.truncated)

@@ -170,11 +170,11 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
         options.pop("reset_mask", None)
         number, puck = read_options(options)
         seeds = read_seeds(seed, self.num_envs, "worlds")
-        super().reset(seed=seed if isinstance(seed, int) else None)
+        super().reset(seed=seeds[0] if np.ndim(seed) == 0 else None)  # type: ignore[arg-type]
         if not self._is_started:
             fallback = self.np_random.integers(2**63, size=self.num_envs).tolist()
             seeds = [new if seed is None else seed for seed, new in zip(seeds, fallback, strict=True)]
-        worlds.reset(is_reset, seeds, number, puck, self._rows_to_write(keep=True).arrays())
+        worlds.reset(is_reset, seeds, number, puck, self._rows_to_write().arrays())
         self._is_started = True
         origins = np.array(worlds.origins(), np.uint64).astype(np.int64)
         self._seeds = origins[:, 0].copy()
@@ -200,7 +200,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
         worlds = self._require_worlds()
         checked = numbers("actions", actions, self.action_space.shape)  # type: ignore[arg-type]
         before = self._before()
-        rows = self._rows_to_write(keep=False)
+        rows = self._rows_to_write()
         worlds.step(checked, rows.arrays())
         return self._result(checked, before)
 
@@ -218,7 +218,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
         worlds = self._require_worlds()
         if self._sent is None:
             raise OrderError("recv: expected a step that was sent, got none: call send() first")
-        worlds.recv(self._rows_to_write(keep=False).arrays())
+        worlds.recv(self._rows_to_write().arrays())
         checked, observations, states = self._sent
         self._sent = None
         return self._result(checked, (observations, states))
@@ -228,16 +228,13 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
             return self._rows.observations, self._rows.next_states
         return self._rows.observations.copy(), self._rows.next_states.copy()
 
-    def _rows_to_write(self, *, keep: bool) -> Rows:
+    def _rows_to_write(self) -> Rows:
         if self.copy:
-            previous = self._rows.observations
             self._rows.renew()
-            if keep:
-                self._rows.observations[:] = previous
         return self._rows
 
     def _observations(self) -> npt.NDArray[np.float32]:
-        # A reset of some worlds changes this array in place, so the caller gets a copy.
+        # The next step and a reset of some worlds go on from this array, so the caller gets a copy, which it may change.
         return self._rows.observations.copy() if self.copy else self._rows.observations
 
     def _result(
@@ -265,7 +262,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
         if was_reset.any():
             # Infos have the number of the new episode; rows have the number of the ended one.
             infos |= self._origins(was_reset, rows.numbers + int(same_step))
-        return rows.observations, rows.rewards, rows.terminated, rows.truncated, infos
+        return self._observations(), rows.rewards, rows.terminated, rows.truncated, infos
 
     def _step_infos(self, stepped: Bools, ended: Bools) -> dict[str, Any]:
         rows = self._rows
@@ -341,7 +338,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
                 raise ArgumentTypeError(f"states[{index}]: expected what save() returned, got {state!r:.80}")
         if not self._is_started:
             self.reset(seed=0)
-        rows = self._rows_to_write(keep=True)
+        rows = self._rows_to_write()
         for index, state in enumerate(states):
             worlds.restore(index, state, rows.arrays())
         origins = np.array(worlds.origins(), np.uint64).astype(np.int64)
@@ -407,12 +404,16 @@ def read_seeds(seed: object, count: int, things: str) -> list[int | None]:
     """``seed`` as one seed per world or game: s as s, s + 1, …; None as no seeds; else a sequence, elements may be None."""
     if seed is None:
         return [None] * count
-    if isinstance(seed, (int, np.integer)) and not isinstance(seed, (bool, np.bool_)):
+    if isinstance(seed, Sequence) and not isinstance(seed, (str, bytes)) or np.ndim(seed) == 1:  # type: ignore[arg-type]
+        seeds = list(seed)  # type: ignore[call-overload]
+        if len(seeds) != count:
+            raise ArgumentError(f"seed: expected one for each of {count} {things}, got {len(seeds)}")
+        return [None if value is None else seed_number(f"seed[{index}]", value) for index, value in enumerate(seeds)]
+    try:
         first = seed_number("seed", seed)
-        last = seed_number(f"seed + {count - 1}, the last of {count} {things}", first + count - 1)
-        return list(range(first, last + 1))
-    if isinstance(seed, (str, bytes)) or not isinstance(seed, (Sequence, np.ndarray)):
-        raise ArgumentTypeError(f"seed: expected a whole number, or one for each of {count} {things}, got {seed!r:.80}")
-    if len(seed) != count:
-        raise ArgumentError(f"seed: expected one for each of {count} {things}, got {len(seed)}")
-    return [None if value is None else seed_number(f"seed[{index}]", value) for index, value in enumerate(seed)]
+    except ArgumentTypeError:
+        raise ArgumentTypeError(
+            f"seed: expected a whole number, or one for each of {count} {things}, got {seed!r:.80}"
+        ) from None
+    last = seed_number(f"seed + {count - 1}, the last of {count} {things}", first + count - 1)
+    return list(range(first, last + 1))

@@ -1,4 +1,4 @@
-//! A running game: two robots and a puck on one table. It consists of rallies: each lasts until a goal, a foul or
+//! A game under way: two robots and a puck on one table. It consists of rallies: each lasts until a goal, a foul or
 //! another reason to put the puck down again.
 
 use super::settings::GameSettings;
@@ -16,9 +16,9 @@ pub struct GameOrigin {
     pub number: u32,
 }
 
-/// A running game, and what is needed to repeat its current rally.
+/// A game under way, and what is needed to repeat its current rally.
 #[derive(Debug, Clone)]
-pub struct RunningGame {
+pub struct TableGame {
     /// The simulated game.
     pub game: Game,
     /// What it started from.
@@ -35,7 +35,7 @@ pub struct RunningGame {
     plant: Arc<Plant>,
 }
 
-impl RunningGame {
+impl TableGame {
     /// A game at its start. The arms of `previous` are used if they are the same.
     pub fn start(settings: &GameSettings, origin: GameOrigin, previous: Option<&Self>) -> Self {
         let plant = match previous {
@@ -120,14 +120,14 @@ impl RunningGame {
         }
         let plant = Arc::new(settings.plant(origin.seed));
         let setup = settings.game_setup(&plant, origin.seed, origin.number);
-        let mut running = Self::new(Game::at_rally(setup, progress), origin, plant);
+        let mut game = Self::new(Game::at_rally(setup, progress), origin, plant);
         for (step, both) in actions.chunks_exact(len).enumerate() {
             let (first, second) = both.split_at(first_len);
             let actions = [
                 present(&formats[0], first, step)?,
                 present(&formats[1], second, step)?,
             ];
-            if running.step(settings, actions).rally_end.is_some() {
+            if game.step(settings, actions).rally_end.is_some() {
                 return Err(argument_error(
                     "state",
                     "actions of a rally that goes on",
@@ -135,7 +135,7 @@ impl RunningGame {
                 ));
             }
         }
-        Ok(running)
+        Ok(game)
     }
 }
 
