@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
+from gymnasium.wrappers import RecordEpisodeStatistics, TimeLimit
+from gymnasium.wrappers.vector import RecordEpisodeStatistics as VectorStatistics
 
 import faceoff
 from faceoff.gym import AirHockeyEnv, AirHockeyVectorEnv, MalletPlane, MalletPlaneVector
@@ -97,3 +99,17 @@ def test_invalid_environments_and_actions_are_refused() -> None:
         env.step(np.array([np.nan, 0.0]))
     with pytest.raises(faceoff.ArgumentError, match="shape"):
         env.step(np.zeros(3))
+
+
+def test_wrappers_keep_the_metadata_that_recorders_read() -> None:
+    env = MalletPlane(AirHockeyEnv("defend", action_mode="raw", interpolation=3, render_mode="rgb_array"))
+    single = RecordEpisodeStatistics(TimeLimit(env, 20))
+    envs = AirHockeyVectorEnv(2, "defend", action_mode="raw", interpolation=3, render_mode="rgb_array")
+    many = VectorStatistics(MalletPlaneVector(envs))
+    for recorded in (single, many):
+        assert (recorded.metadata["render_fps"], recorded.render_mode) == (50, "rgb_array")
+    single.reset(seed=1)
+    many.reset(seed=1)
+    for _ in range(20):
+        *_, info = single.step(np.zeros(2))
+    assert info["episode"]["l"] == 20
