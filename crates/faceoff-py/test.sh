@@ -31,7 +31,7 @@ wheel() {
 
 case ${1:-} in
     wheel)
-        wheel "$target/wheels" --release --zig --target x86_64-unknown-linux-gnu --compatibility manylinux2014
+        wheel "$target/wheels" --profile wheel --zig --target x86_64-unknown-linux-gnu --compatibility manylinux2014
         ;;
     test)
         shift
@@ -50,7 +50,7 @@ case ${1:-} in
         ;;
     learning)
         shift
-        wheel "$target/wheels-of-this-host" --release
+        wheel "$target/wheels-of-this-host" --profile wheel
         "$root/tests/python-environment.sh" "$target/python-learning" "$here/tests_learning/requirements.txt"
         "$target/python-learning/bin/python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps \
             "$target"/wheels-of-this-host/*.whl
