@@ -176,7 +176,7 @@ def test_invalid_modules_and_environments_are_refused(make: Any, message: str, t
 
 
 def test_mallet_speed_of_worlds_is_checked() -> None:
-    with pytest.raises(faceoff.ArgumentTypeError, match="max_speed_m_s: expected a speed above 0 and up to 5, got 'fast'"):
+    with pytest.raises(faceoff.ArgumentTypeError, match="max_speed_m_s: expected a number above 0 and up to 5, got 'fast'"):
         faceoff.sb3.make_vec_env("defend", 2, mallet_speed_m_s="fast")  # type: ignore[arg-type]
     with pytest.raises(faceoff.ArgumentError, match="env: expected one made with action_mode='raw' and interpolation=3"):
         faceoff.sb3.make_vec_env("defend", 2, mallet_speed_m_s=1.0, action_mode="delta")
