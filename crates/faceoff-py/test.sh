@@ -1,6 +1,7 @@
 #!/bin/sh
 # Builds the wheel of the Python package, and tests it in an environment without the sources.
-#   test.sh wheel       one wheel in TARGET/wheels, for glibc 2.17 and later: zig links it
+#   test.sh wheel       one wheel in TARGET/wheels, for glibc 2.17 and later: zig links it; ARCH=aarch64 makes that of 64-bit ARM, for which
+#                       Rust's standard library must be installed: rustup target add aarch64-unknown-linux-gnu
 #   test.sh test [...]  a wheel of the development build for this host's glibc, like the programs it is compared with; runs
 #                       pytest on it, with the remaining arguments
 #   test.sh learning    the wheel with libraries that need torch; repeats the training of the examples
@@ -31,7 +32,7 @@ wheel() {
 
 case ${1:-} in
     wheel)
-        wheel "$target/wheels" --profile wheel --zig --target x86_64-unknown-linux-gnu --compatibility manylinux2014
+        wheel "$target/wheels" --profile wheel --zig --target "${ARCH:-x86_64}-unknown-linux-gnu" --compatibility manylinux2014
         ;;
     test)
         shift
