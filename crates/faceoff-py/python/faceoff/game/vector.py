@@ -12,7 +12,7 @@ from gymnasium.vector import VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from faceoff._arguments import flag, integer, known_names, mask, numbers, one_of
-from faceoff.errors import ArgumentError
+from faceoff.errors import ArgumentError, ArgumentTypeError
 from faceoff.game.batch import GAME_ARGUMENTS, GameArguments, GameBatch, agent_of
 from faceoff.game.render import draw_game
 from faceoff.game.self_play import check_pool, draw_opponent, read_pool
@@ -128,7 +128,7 @@ class _GameVectorEnv(VectorEnv[Any, Any, Any]):
         if options is None:
             return np.ones(self._batch.games, np.bool_)
         if not isinstance(options, Mapping):
-            raise ArgumentError(f"options: expected a mapping with reset_mask, got {options!r:.80}")
+            raise ArgumentTypeError(f"options: expected a mapping with reset_mask, got {options!r:.80}")
         unknown = [name for name in options if name != "reset_mask"]
         if unknown:
             raise ArgumentError(f"options: expected reset_mask, got {unknown[0]!r}")
