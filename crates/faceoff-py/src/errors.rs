@@ -56,3 +56,49 @@ pub fn argument_error(
 ) -> PyErr {
     ArgumentError::new_err(format!("{name}: expected {expected}, got {got}"))
 }
+
+/// The error of a call after `close()`.
+pub fn closed_error() -> PyErr {
+    ClosedError::new_err("expected an open environment, got one that was closed: make a new one")
+}
+
+/// The error of a call before the first `reset()`.
+pub fn missing_reset_error() -> PyErr {
+    OrderError::new_err("expected reset() first, got another call")
+}
+
+/// Borrows an object whose methods run for one thread at a time.
+///
+/// # Errors
+/// If another thread runs one.
+pub fn borrow_mut<'py, T>(object: &Bound<'py, T>) -> PyResult<PyRefMut<'py, T>>
+where
+    T: pyo3::PyClass<Frozen = pyo3::pyclass::boolean_struct::False>,
+{
+    object.try_borrow_mut().map_err(|_| {
+        OrderError::new_err(
+            "expected one call at a time, got one while another thread's is under way",
+        )
+    })
+}
+
+/// Refuses a pickled state of another version of this package, which would play it differently.
+///
+/// # Errors
+/// If `version` is not this one.
+pub fn check_version(version: &str) -> PyResult<()> {
+    let own = env!("CARGO_PKG_VERSION");
+    if version == own {
+        return Ok(());
+    }
+    Err(argument_error(
+        "state",
+        format!(
+            "one pickled by this version of faceoff, {own}, which alone plays it again exactly"
+        ),
+        format!(
+            "one of version {}",
+            faceoff_types::escape_unprintable(version)
+        ),
+    ))
+}

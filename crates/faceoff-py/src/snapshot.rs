@@ -1,7 +1,7 @@
 //! Saved states of worlds.
 
 use crate::{
-    errors::{argument_error, catch_panic},
+    errors::{argument_error, catch_panic, check_version},
     setup::Setup,
     world::{Origin, World, check_puck},
 };
@@ -102,19 +102,7 @@ impl Snapshot {
 pub fn load_snapshot(py: Python<'_>, data: &[u8]) -> PyResult<Snapshot> {
     let saved: SavedState = serde_json::from_slice(data)
         .map_err(|error| argument_error("state", "a state pickled by faceoff", error))?;
-    let own_version = env!("CARGO_PKG_VERSION");
-    if saved.faceoff != own_version {
-        return Err(argument_error(
-            "state",
-            format!(
-                "one pickled by this version of faceoff, {own_version}, which alone plays it again exactly"
-            ),
-            format!(
-                "one of version {}",
-                faceoff_types::escape_unprintable(&saved.faceoff)
-            ),
-        ));
-    }
+    check_version(&saved.faceoff)?;
     let setup = serde_json::to_string(&saved.setup)
         .map_err(|error| argument_error("state", "a valid setup", error))?;
     let setup = Setup::read(&setup)?;

@@ -2,7 +2,8 @@
 
 use crate::{
     errors::{
-        ClosedError, OrderError, argument_error, catch_panic, panic_message, simulator_error,
+        OrderError, argument_error, borrow_mut, catch_panic, closed_error, missing_reset_error,
+        panic_message, simulator_error,
     },
     outputs::{OwnedRows, chunks_with_worlds},
     pool::{Pool, pool_if_parallel},
@@ -87,7 +88,7 @@ impl Worlds {
         puck: Option<[f64; 6]>,
         mut rows: Rows<'_>,
     ) -> PyResult<()> {
-        let this = &mut *borrow(slf)?;
+        let this = &mut *borrow_mut(slf)?;
         let setup = &*this.setup;
         let mut outputs = rows.outputs(this.count, setup.observation_len())?;
         let mask = mask.as_slice()?;
@@ -151,7 +152,7 @@ impl Worlds {
         actions: PyReadonlyArray2<'_, f64>,
         mut rows: Rows<'_>,
     ) -> PyResult<()> {
-        let this = &mut *borrow(slf)?;
+        let this = &mut *borrow_mut(slf)?;
         let mut outputs = rows.outputs(this.count, this.setup.observation_len())?;
         let actions = this.check_actions(&actions)?;
         let pool = pool_if_parallel(&mut this.pool)?;
@@ -189,7 +190,7 @@ impl Worlds {
         actions: PyReadonlyArray2<'_, f64>,
         states: bool,
     ) -> PyResult<()> {
-        let this = &mut *borrow(slf)?;
+        let this = &mut *borrow_mut(slf)?;
         let actions = this.check_actions(&actions)?.to_vec();
         let pool = this.pool.get_or_start()?;
         let (setup, autoreset) = (Arc::clone(&this.setup), this.autoreset);
@@ -220,7 +221,7 @@ impl Worlds {
 
     /// Waits for the step that was sent.
     fn recv(slf: &Bound<'_, Self>, py: Python<'_>, mut rows: Rows<'_>) -> PyResult<()> {
-        let this = &mut *borrow(slf)?;
+        let this = &mut *borrow_mut(slf)?;
         let mut outputs = rows.outputs(this.count, this.setup.observation_len())?;
         let (worlds, owned) = this.state.receive(py)?;
         owned.copy_to(&mut outputs);
@@ -230,7 +231,7 @@ impl Worlds {
 
     /// The exact state of a world.
     fn save(slf: &Bound<'_, Self>, index: usize) -> PyResult<Snapshot> {
-        let this = &mut *borrow(slf)?;
+        let this = &mut *borrow_mut(slf)?;
         let setup = Arc::clone(&this.setup);
         let world = this.world(index)?.clone();
         Ok(Snapshot { setup, world })
@@ -243,7 +244,7 @@ impl Worlds {
         snapshot: &Bound<'_, Snapshot>,
         mut rows: Rows<'_>,
     ) -> PyResult<()> {
-        let this = &mut *borrow(slf)?;
+        let this = &mut *borrow_mut(slf)?;
         let snapshot = snapshot.get();
         let (count, len) = (this.count, this.setup.observation_len());
         if *snapshot.setup != *this.setup {
@@ -266,7 +267,7 @@ impl Worlds {
 
     /// The seed and episode number of each world.
     fn origins(slf: &Bound<'_, Self>) -> PyResult<Vec<(u64, u32)>> {
-        let this = &mut *borrow(slf)?;
+        let this = &mut *borrow_mut(slf)?;
         let worlds = this.state.idle_worlds()?;
         let origin = |world: &World| (world.origin.seed, world.origin.number);
         Ok(worlds.iter().map(origin).collect())
@@ -274,25 +275,25 @@ impl Worlds {
 
     /// The true state of a world, see [`crate::world::STATE_LEN`].
     fn state(slf: &Bound<'_, Self>, index: usize) -> PyResult<Vec<f64>> {
-        let this = &mut *borrow(slf)?;
+        let this = &mut *borrow_mut(slf)?;
         Ok(this.world(index)?.state().to_vec())
     }
 
     /// Whether a step that was sent is running.
     #[getter]
     fn is_sent(slf: &Bound<'_, Self>) -> PyResult<bool> {
-        Ok(matches!(borrow(slf)?.state, State::Sent(_)))
+        Ok(matches!(borrow_mut(slf)?.state, State::Sent(_)))
     }
 
     /// Number of threads of the pool.
     #[getter]
     fn threads(slf: &Bound<'_, Self>) -> PyResult<usize> {
-        Ok(borrow(slf)?.pool.threads())
+        Ok(borrow_mut(slf)?.pool.threads())
     }
 
     /// Releases worlds and threads. Later calls are refused.
     fn close(slf: &Bound<'_, Self>) -> PyResult<()> {
-        let this = &mut *borrow(slf)?;
+        let this = &mut *borrow_mut(slf)?;
         this.state = State::Closed;
         this.pool = Pool::new(this.pool.threads());
         Ok(())
@@ -347,9 +348,7 @@ impl State {
             Self::Sent(_) => Err(OrderError::new_err(
                 "expected recv() of the step that was sent, got another call",
             )),
-            Self::Closed => Err(ClosedError::new_err(
-                "expected an open environment, got one that was closed: make a new one",
-            )),
+            Self::Closed => Err(closed_error()),
             Self::Failed => Err(simulator_error("an earlier step failed")),
         }
     }
@@ -401,20 +400,8 @@ fn check_call_order(worlds: &[World], autoreset: Autoreset) -> PyResult<()> {
     }
 }
 
-fn missing_reset_error() -> PyErr {
-    OrderError::new_err("expected reset() first, got another call")
-}
-
 fn worlds_per_chunk(worlds: usize, threads: usize) -> usize {
     worlds
         .div_ceil(threads * CHUNKS_PER_THREAD)
         .next_multiple_of(LANES)
-}
-
-fn borrow<'py>(worlds: &Bound<'py, Worlds>) -> PyResult<PyRefMut<'py, Worlds>> {
-    worlds.try_borrow_mut().map_err(|_| {
-        OrderError::new_err(
-            "expected one call at a time, got one while another thread's is under way",
-        )
-    })
 }

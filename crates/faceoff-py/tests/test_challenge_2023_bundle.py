@@ -56,7 +56,8 @@ def test_package_alone_is_converted_like_the_folder_above(tmp_path: Path) -> Non
 
 def test_package_of_2023_and_repository_are_left_out(tmp_path: Path) -> None:
     fork = tmp_path / "fork"
-    shutil.copytree(TEAM, fork)
+    # Another test may have imported the team from its place.
+    shutil.copytree(TEAM, fork, ignore=shutil.ignore_patterns("__pycache__"))
     for name in ("air_hockey_challenge/framework", ".git", "air_hockey_agent/__pycache__", "baseline"):
         (fork / name).mkdir(parents=True)
         (fork / name / "file.py").touch()
@@ -113,7 +114,7 @@ def test_arguments_of_make_bundle_are_checked(tmp_path: Path) -> None:
         ((TEAM, tmp_path / "file"), {}, "bundle: expected a new folder, got .*exists; choose another name"),
         ((TEAM, tmp_path), {}, "bundle: expected a new folder"),
         ((TEAM, TEAM / "bundle"), {}, "bundle: expected a folder outside"),
-        ((TEAM, tmp_path / "file" / "bundle"), {}, "bundle: expected a folder that can be made"),
+        ((TEAM, tmp_path / "file" / "bundle"), {}, "bundle: expected a folder that can be created"),
         ((3, tmp_path / "b"), {}, "folder: expected the path of a folder, got 3"),
         ((TEAM, ""), {}, "bundle: expected the path of a folder, got ''"),
         ((TEAM, tmp_path / "b"), {"name": "two\nlines"}, "name: expected 1 to 64 printable characters"),

@@ -9,7 +9,10 @@ pub use rows::{GAME_FACTS, GAME_STATE_LEN, RALLY_ENDS};
 pub use snapshot::{GameSnapshot, load_game};
 
 use crate::{
-    errors::{ClosedError, OrderError, argument_error, catch_panic, simulator_error},
+    errors::{
+        OrderError, argument_error, borrow_mut, catch_panic, closed_error, missing_reset_error,
+        simulator_error,
+    },
     pool::{Pool, pool_if_parallel},
     step::Autoreset,
 };
@@ -65,7 +68,7 @@ impl Games {
         seeds: Vec<Option<u64>>,
         mut rows: GameRows<'_>,
     ) -> PyResult<()> {
-        let this = &mut *borrow(slf)?;
+        let this = &mut *borrow_mut(slf)?;
         let mut rows = rows.rows(this.count)?;
         let mask = mask.as_slice()?;
         if mask.len() != this.count || seeds.len() != this.count {
@@ -123,7 +126,7 @@ impl Games {
         actions: [Option<PyReadonlyArray2<'_, f64>>; 2],
         mut rows: GameRows<'_>,
     ) -> PyResult<()> {
-        let this = &mut *borrow(slf)?;
+        let this = &mut *borrow_mut(slf)?;
         let mut rows = rows.rows(this.count)?;
         let mut slices: [Option<&[f64]>; 2] = [None, None];
         for (robot, array) in actions.iter().enumerate() {
@@ -169,7 +172,7 @@ impl Games {
 
     /// The exact state of a game.
     fn save(slf: &Bound<'_, Self>, index: usize) -> PyResult<GameSnapshot> {
-        let this = &mut *borrow(slf)?;
+        let this = &mut *borrow_mut(slf)?;
         let settings = Arc::clone(&this.settings);
         let game = this.game(index)?.clone();
         Ok(GameSnapshot { settings, game })
@@ -183,7 +186,7 @@ impl Games {
         snapshot: &Bound<'_, GameSnapshot>,
         mut rows: GameRows<'_>,
     ) -> PyResult<()> {
-        let this = &mut *borrow(slf)?;
+        let this = &mut *borrow_mut(slf)?;
         let snapshot = snapshot.get();
         if *snapshot.settings != *this.settings {
             return Err(argument_error(
@@ -206,26 +209,26 @@ impl Games {
 
     /// The seed and number of each game.
     fn origins(slf: &Bound<'_, Self>) -> PyResult<Vec<(u64, u32)>> {
-        let this = &mut *borrow(slf)?;
+        let this = &mut *borrow_mut(slf)?;
         let origin = |game: &TableGame| (game.origin.seed, game.origin.number);
         Ok(this.state.open_games()?.iter().map(origin).collect())
     }
 
     /// The present true state of a game, [`GAME_STATE_LEN`] numbers.
     fn state(slf: &Bound<'_, Self>, index: usize) -> PyResult<Vec<f64>> {
-        let this = &mut *borrow(slf)?;
+        let this = &mut *borrow_mut(slf)?;
         Ok(flatten(&this.game(index)?.game.state()))
     }
 
     /// Number of threads of the pool.
     #[getter]
     fn threads(slf: &Bound<'_, Self>) -> PyResult<usize> {
-        Ok(borrow(slf)?.pool.threads())
+        Ok(borrow_mut(slf)?.pool.threads())
     }
 
     /// Releases games and threads. Later calls are refused.
     fn close(slf: &Bound<'_, Self>) -> PyResult<()> {
-        let this = &mut *borrow(slf)?;
+        let this = &mut *borrow_mut(slf)?;
         this.state = State::Closed;
         this.pool = Pool::new(this.pool.threads());
         Ok(())
@@ -275,9 +278,7 @@ impl State {
     fn open_games(&mut self) -> PyResult<&mut Vec<TableGame>> {
         match self {
             Self::Open(games) => Ok(games),
-            Self::Closed => Err(ClosedError::new_err(
-                "expected an open environment, got one that was closed: make a new one",
-            )),
+            Self::Closed => Err(closed_error()),
             Self::Failed => Err(simulator_error("an earlier step failed")),
         }
     }
@@ -324,16 +325,4 @@ fn check_call_order(games: &[TableGame], autoreset: Autoreset) -> PyResult<()> {
              reset(options={{\"reset_mask\": mask}}) first"
         ))),
     }
-}
-
-fn missing_reset_error() -> PyErr {
-    OrderError::new_err("expected reset() first, got another call")
-}
-
-fn borrow<'py>(games: &Bound<'py, Games>) -> PyResult<PyRefMut<'py, Games>> {
-    games.try_borrow_mut().map_err(|_| {
-        OrderError::new_err(
-            "expected one call at a time, got one while another thread's is under way",
-        )
-    })
 }

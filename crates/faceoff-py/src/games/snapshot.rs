@@ -4,7 +4,7 @@ use super::{
     game::{GameOrigin, TableGame},
     settings::GameSettings,
 };
-use crate::errors::{argument_error, catch_panic};
+use crate::errors::{argument_error, catch_panic, check_version};
 use faceoff_sim::{
     ViolatedGroups,
     game::{GameProgress, referee::Referee},
@@ -124,19 +124,7 @@ impl GameSnapshot {
 pub fn load_game(py: Python<'_>, data: &[u8]) -> PyResult<GameSnapshot> {
     let saved: SavedGame = serde_json::from_slice(data)
         .map_err(|error| argument_error("state", "a game pickled by faceoff", error))?;
-    let own_version = env!("CARGO_PKG_VERSION");
-    if saved.faceoff != own_version {
-        return Err(argument_error(
-            "state",
-            format!(
-                "one pickled by this version of faceoff, {own_version}, which alone plays it again exactly"
-            ),
-            format!(
-                "one of version {}",
-                faceoff_types::escape_unprintable(&saved.faceoff)
-            ),
-        ));
-    }
+    check_version(&saved.faceoff)?;
     if saved.serving_robot > 1 {
         return Err(argument_error(
             "state",

@@ -6,15 +6,14 @@ import json
 import os
 import re
 import shutil
-import tempfile
 from pathlib import Path
 from typing import Any
 
 from faceoff import _native
 from faceoff._export.environment import PolicyEnvironment
+from faceoff._folders import copy_parts, new_folder
 from faceoff.errors import ArgumentError, ArgumentTypeError
 
-PACKAGE = Path(__file__).parents[1]
 #: Parts of the package that each agent needs, and those for mallet actions.
 PARTS = ("__init__.py", "errors.py", "agent.py", "actions.py")
 MALLET_PARTS = ("kinematics",)
@@ -46,31 +45,15 @@ def check_name(name: object, folder: Path) -> str:
 
 
 def write(folder: Path, name: str, model: Any, environment: PolicyEnvironment) -> None:
-    """Writes the bundle beside its place and moves it there, so that no incomplete bundle remains after an error."""
-    try:
-        unfinished = Path(tempfile.mkdtemp(prefix=f".{folder.name[:100]}-", dir=folder.parent))
-    except (OSError, ValueError) as error:
-        raise ArgumentError(f"folder: expected a path in a folder that can be written, got {error}") from error
-    try:
-        unfinished.chmod(0o755)
+    """Writes the bundle."""
+    has_mallet = environment.mallet_speed_m_s is not None
+    with new_folder("folder", folder) as unfinished:
         (unfinished / "agent.toml").write_text(_manifest(name, environment), encoding="utf-8")
         (unfinished / "agent.py").write_text(_agent(environment), encoding="utf-8")
         (unfinished / "policy.onnx").write_bytes(model.SerializeToString())
-        package = unfinished / "faceoff"
-        package.mkdir()
-        has_mallet = environment.mallet_speed_m_s is not None
-        for part in (*PARTS, *(MALLET_PARTS if has_mallet else ())):
-            source = PACKAGE / part
-            if source.is_dir():
-                shutil.copytree(source, package / part, ignore=shutil.ignore_patterns("__pycache__"))
-            else:
-                shutil.copyfile(source, package / part)
+        copy_parts((*PARTS, *(MALLET_PARTS if has_mallet else ())), unfinished)
         if has_mallet:
-            shutil.copyfile(str(_native.__file__), package / "_native.abi3.so")
-        os.rename(unfinished, folder)
-    except BaseException:
-        shutil.rmtree(unfinished, ignore_errors=True)
-        raise
+            shutil.copyfile(str(_native.__file__), unfinished / "faceoff" / "_native.abi3.so")
 
 
 def _manifest(name: str, environment: PolicyEnvironment) -> str:

@@ -7,10 +7,9 @@ import json
 import os
 import shutil
 import stat
-import tempfile
 from pathlib import Path
 
-import faceoff
+from faceoff._folders import copy_parts, new_folder
 from faceoff.challenge_2023._adapter import CONFIG_FILE, TEAM_FOLDER
 from faceoff.challenge_2023._arguments import path_of
 from faceoff.challenge_2023._config import interpolation_order, read_config
@@ -23,9 +22,8 @@ RUNTIME = "python3-ml"
 PROGRAM = "play_2023.py"
 """The program of a converted bundle."""
 
-_SOURCE = Path(faceoff.__file__).parent
 #: Parts of this package for the bundle. They need only NumPy.
-_PARTS = ("__init__.py", "agent.py", "errors.py", "kinematics", "challenge_2023")
+_PARTS = ("__init__.py", "_folders.py", "agent.py", "errors.py", "kinematics", "challenge_2023")
 #: Folders that are not part of an agent; the package of 2023 would hide its substitute.
 _LEFT_OUT = ("__pycache__", ".git")
 _REPLACED = "air_hockey_challenge"
@@ -68,22 +66,12 @@ def make_bundle(folder: str | Path, bundle: str | Path, *, name: str | None = No
     if target.resolve().is_relative_to(source.resolve()):
         raise ArgumentError(f"bundle: expected a folder outside {str(source)!r}, got {str(target)!r}")
     config = read_config(package / "agent_config.yml")
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        unfinished = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
-    except OSError as error:
-        raise ArgumentError(f"bundle: expected a folder that can be made, got {str(target)!r}: {error}") from error
-    try:
+    with new_folder("bundle", target) as unfinished:
         # A package alone gets the folder above it, where its own modules look for it.
         into = unfinished / TEAM_FOLDER
         _copy(source, into / PACKAGE if package == source else into)
         _write_program(unfinished, title, runtime, interpolation_order(config))
         (unfinished / CONFIG_FILE).write_text(json.dumps(config, indent=1) + "\n", encoding="utf-8")
-        unfinished.chmod(0o755)
-        unfinished.rename(target)
-    except BaseException:
-        shutil.rmtree(unfinished, ignore_errors=True)
-        raise
 
 
 def _text(name: str, value: object, longest: int) -> str:
@@ -171,10 +159,4 @@ def _write_program(folder: Path, name: str, runtime: str, order: int | None) -> 
         lines.append(f"interpolation = {order}")
     (folder / "agent.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
     (folder / PROGRAM).write_text(_PROGRAM_TEXT, encoding="utf-8")
-    for part in _PARTS:
-        source, copy = _SOURCE / part, folder / "faceoff" / part
-        copy.parent.mkdir(exist_ok=True)
-        if source.is_dir():
-            shutil.copytree(source, copy, ignore=shutil.ignore_patterns("__pycache__"))
-        else:
-            shutil.copy(source, copy)
+    copy_parts(_PARTS, folder)

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import os
-import shutil
-import tempfile
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from faceoff.errors import ArgumentError, ArgumentTypeError
+from faceoff._folders import new_folder
+from faceoff.errors import ArgumentTypeError
 
 from ._dataset import Dataset
 from ._errors import ExistsError
@@ -59,20 +58,9 @@ def to_parquet(recording: Dataset | Game, out: str | os.PathLike[str]) -> list[P
         raise ExistsError(f"out: {folder} is there already; name another folder")
     recording.check()
     names = [name for name in recording.manifest["files"] if name.endswith(".parquet")]
-    try:
-        folder.absolute().parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ArgumentError(f"out: expected a folder that can be created, got {folder}: {error}") from None
-    # Written beside it, so that after an error no half of it is left under its name.
-    unfinished = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.absolute().parent))
-    try:
+    with new_folder("out", folder) as unfinished:
         for name in names:
             _rewrite(recording._container.table(name), unfinished / name)
-        unfinished.chmod(0o755)
-        unfinished.rename(folder)
-    except BaseException:
-        shutil.rmtree(unfinished, ignore_errors=True)
-        raise
     return [folder / name for name in names]
 
 
