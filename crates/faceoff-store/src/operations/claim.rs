@@ -77,6 +77,10 @@ impl Store {
                             continue;
                         }
                         Ok(Some(job)) => {
+                            if leased.attempts > 1 {
+                                // Ends of leases are no events of their own: this line tells why a job runs once more.
+                                tracing::info!(job = %leased.id.0, attempt = leased.attempts, "a job is leased again");
+                            }
                             let lease = SignedDuration::from_secs(lease_s.into());
                             let claim = JobClaim {
                                 job: leased.id.0,
