@@ -1,6 +1,7 @@
 // Live updates. A page names the kinds of events that change it (its topics). This script follows the event stream of the API,
 // loads the page again after such an event, and replaces the marked regions that differ. Without the script or the stream a page
-// stays as it was loaded. The script also adds the visitor's local time to times.
+// stays as it was loaded. The script also adds the visitor's local time to times, counts down to the next evaluation, and moves the
+// drawing of the front page.
 
 const STREAM = "/api/v1/events/stream";
 // Wait before reconnecting to the stream; it doubles after each failure.
@@ -29,11 +30,52 @@ function addLocalTimes(root) {
   }
 }
 
+// Time until the next evaluation, beside the time itself.
+function showCountdowns() {
+  for (const time of document.querySelectorAll("time[data-countdown]")) {
+    const minutes = Math.ceil((new Date(time.dateTime) - Date.now()) / 60000);
+    let shown = time.parentElement.querySelector(".countdown");
+    if (!shown) {
+      shown = document.createElement("span");
+      shown.className = "countdown";
+      time.after(shown);
+    }
+    const [days, hours] = [Math.floor(minutes / 1440), Math.floor((minutes % 1440) / 60)];
+    const parts = [[days, "d"], [hours, "h"], [days > 0 ? 0 : minutes % 60, "min"]].filter(([count]) => count > 0);
+    shown.textContent = parts.length > 0 ? `, in ${parts.map(([count, unit]) => `${count} ${unit}`).join(" ")}` : "";
+  }
+}
+
+// The moving drawing of the front page. It stays still for visitors who asked for less motion, until they press the button.
+function startHighlight() {
+  const figure = document.querySelector("[data-highlight]");
+  const button = figure?.querySelector("[data-highlight-pause]");
+  const drawing = figure?.querySelector("svg");
+  if (!button || !drawing.pauseAnimations) return;
+  let isRunning = false;
+  const run = (isToRun) => {
+    if (isToRun && button.dataset.started === undefined) {
+      button.dataset.started = "";
+      for (const animation of drawing.querySelectorAll("animate")) animation.beginElement();
+    }
+    if (isToRun) drawing.unpauseAnimations();
+    else drawing.pauseAnimations();
+    isRunning = isToRun;
+    button.textContent = isRunning ? "Pause" : "Play";
+  };
+  button.hidden = false;
+  button.addEventListener("click", () => run(!isRunning));
+  run(!matchMedia("(prefers-reduced-motion: reduce)").matches);
+}
+
 const regionsOf = (page) => [...page.querySelectorAll("[data-live-region]")];
 const nameOf = (region) => region.dataset.liveRegion;
 // HTML of the regions as sent by the server, without local times.
 const sentHtml = new Map(regionsOf(document).map((region) => [nameOf(region), region.outerHTML]));
 addLocalTimes(document);
+showCountdowns();
+setInterval(showCountdowns, 30000);
+startHighlight();
 
 // Describes an element, so that `find` finds it in the new version of its region.
 function locate(element, region) {
@@ -62,6 +104,7 @@ function replace(old, next) {
   [...region.querySelectorAll("details")].forEach((details, index) => { if (open[index]) details.open = true; });
   addLocalTimes(region);
   old.replaceWith(region);
+  showCountdowns();
   [...region.querySelectorAll(".wide")].forEach((wide, index) => { wide.scrollLeft = scrolled[index] ?? 0; });
 
   const moved = anchor && find(anchor.description, region);

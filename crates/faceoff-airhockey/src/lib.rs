@@ -5,6 +5,7 @@
 //! This crate starts no process, opens no file and reads no clock.
 
 mod columns;
+mod drawings;
 mod end_description;
 mod env;
 mod game_record;
@@ -89,28 +90,31 @@ pub fn competition() -> Competition {
         title: "Robot Air Hockey Challenge".to_owned(),
         short_title: "Robot Air Hockey".to_owned(),
         subject: "robot air hockey".to_owned(),
+        summary: "Teams write programs that play air hockey with a simulated KUKA arm. Every day all of them face the same episodes, \
+                  which nobody has seen before; the board shows who succeeds most often, and who would be safe on a real robot."
+            .to_owned(),
         rulesets: AirHockeyRuleset::ALL.map(ruleset).into(),
         has_replays: true,
         has_games: true,
         tasks: vec![
-            task(
-                HIT,
-                "Hit",
-                400_000,
-                "Score a goal against an opponent that moves in a fixed pattern.",
-            ),
-            task(
-                DEFEND,
-                "Defend",
-                400_000,
-                "Stop an incoming puck on the agent’s side of the table.",
-            ),
-            task(
-                PREPARE,
-                "Prepare",
-                200_000,
-                "Move a puck from the rim to a good hitting position.",
-            ),
+            TaskInfo {
+                aim: "Score against a goalkeeper that moves in a fixed pattern.".to_owned(),
+                achievement: "goal".to_owned(),
+                drawing: drawings::HIT.to_owned(),
+                ..task(HIT, "Hit", 400_000)
+            },
+            TaskInfo {
+                aim: "Stop an incoming puck on the agent’s side of the table.".to_owned(),
+                achievement: "stop".to_owned(),
+                drawing: drawings::DEFEND.to_owned(),
+                ..task(DEFEND, "Defend", 400_000)
+            },
+            TaskInfo {
+                aim: "Move a puck from the rim to a good hitting position.".to_owned(),
+                achievement: "preparation".to_owned(),
+                drawing: drawings::PREPARE.to_owned(),
+                ..task(PREPARE, "Prepare", 200_000)
+            },
         ],
         ends: [
             (EpisodeEnd::HORIZON, "time limit reached"),
@@ -240,11 +244,14 @@ const fn ruleset(ruleset: AirHockeyRuleset) -> RulesetInfo {
 }
 
 /// `weight` in millionths.
-fn task(task: Task, title: &str, weight: u32, aim: &str) -> TaskInfo {
+/// A task, without the texts that describe it.
+fn task(task: Task, title: &str, weight: u32) -> TaskInfo {
     TaskInfo {
         task,
         title: title.to_owned(),
-        aim: aim.to_owned(),
+        aim: String::new(),
+        achievement: String::new(),
+        drawing: String::new(),
         weight: Millionths::new(weight),
         max_steps: EPISODE_STEPS,
         control_step_s: CONTROL_STEP_S,

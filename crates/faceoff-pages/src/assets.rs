@@ -58,6 +58,12 @@ pub(super) static REPLAY_STYLE: Asset = Asset::new(
     CSS,
     compressed_text!("web/static/replay.css"),
 );
+/// The front page and the boards.
+pub(super) static FRONT_STYLE: Asset = Asset::new(
+    "/static/front.css",
+    CSS,
+    compressed_text!("web/static/front.css"),
+);
 /// Built from `web/client` by `make web`.
 pub(super) static REPLAY_SCRIPT: Asset = Asset::new(
     "/static/replay.js",
@@ -65,7 +71,7 @@ pub(super) static REPLAY_SCRIPT: Asset = Asset::new(
     compressed_text!("web/client/dist/replay.js"),
 );
 
-static ALL: [&Asset; 8] = [
+static ALL: [&Asset; 9] = [
     &STYLE,
     &SCRIPT,
     &ICON,
@@ -73,6 +79,7 @@ static ALL: [&Asset; 8] = [
     &DASHBOARD_SCRIPT,
     &EPISODES_STYLE,
     &REPLAY_STYLE,
+    &FRONT_STYLE,
     &REPLAY_SCRIPT,
 ];
 

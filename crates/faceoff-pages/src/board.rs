@@ -2,8 +2,10 @@
 //! follows from penalty points: deployable, improvable or non-deployable.
 
 mod address;
+mod course;
 mod day_progress;
 mod days;
+mod front;
 mod info;
 mod rows;
 mod sort;
@@ -12,12 +14,17 @@ use super::{
     baselines::{self, Baseline},
     frame::{Frame, PageProblem, render_with_etag},
 };
+use crate::{assets, chart::TeamsChart, query::with_query};
 use address::Address;
 use askama::Template;
 use axum::{extract::State, response::Response};
+use course::Course;
 use day_progress::DayProgress;
 use days::Days;
-use faceoff_api::{requests::BoardPageQuery, views::team::TeamView};
+use faceoff_api::{
+    requests::{BoardPageQuery, HistoryQuery},
+    views::{board::BoardView, team::TeamView},
+};
 use faceoff_service::{
     app::App,
     extract::{PathParam, QueryParams},
@@ -25,7 +32,8 @@ use faceoff_service::{
     viewer::Viewer,
     views::{board, board_timeline::BoardTimeline, season::SeasonSummary, visibility::Visibility},
 };
-use faceoff_types::Task;
+use faceoff_types::{Competition, Task};
+use front::FrontPage;
 use info::BoardInfo;
 use rows::{Context, Group, OverallRow, TaskRow, common_conditions};
 use sort::Sort;
@@ -43,18 +51,52 @@ struct OverallPage {
     board_info: BoardInfo,
     days: Days,
     sort: Sort,
-    /// BLAKE3 hash of the season's secret, from which all episodes are drawn.
-    commitment: String,
     /// Profile, episodes and rules of all rows; `None` if rows differ.
     conditions: Option<String>,
     /// The earlier day to which changes are relative.
     comparison_day: Option<jiff::civil::Date>,
-    /// Are teams statistically tied?
-    has_ties: bool,
     groups: Vec<Group<OverallRow>>,
     baselines: Vec<Baseline>,
     progress: DayProgress,
     disqualified: Vec<TeamView>,
+    /// Above the newest board of the current stage with all teams; `None` above others.
+    front: Option<FrontPage>,
+    /// For cards that show a link.
+    description: String,
+    styles: [&'static str; 2],
+    course: Option<TeamsChart>,
+    downloads: Downloads,
+}
+
+/// Addresses of the shown board, and of its history, in other formats.
+struct Downloads {
+    /// The address of the board without a format; it ends with `?` or `&`.
+    board: String,
+    history: String,
+}
+
+impl Downloads {
+    fn new(board: &BoardView, query: &BoardPageQuery) -> Self {
+        let path = match board.task {
+            Some(task) => format!("/api/v1/board/{task}"),
+            None => "/api/v1/board".to_owned(),
+        };
+        let mut address = with_query(&path, &query.board());
+        address.push(if address.contains('?') { '&' } else { '?' });
+        Self {
+            board: address,
+            history: with_query(
+                "/api/v1/board/history",
+                &HistoryQuery {
+                    stage: Some(board.stage),
+                    revision: Some(board.revision),
+                    division: board.division.clone(),
+                    task: board.task,
+                    ..HistoryQuery::default()
+                },
+            ),
+        }
+    }
 }
 
 impl OverallPage {
@@ -63,6 +105,13 @@ impl OverallPage {
         let rows = self.groups.iter().flat_map(|group| &group.rows);
         live_text(rows.map(|row| (row.team.team.as_str(), row.score.percent.as_str())))
     }
+}
+
+/// What the page is about, for cards that show a link: who leads, then what the competition is.
+fn description(competition: &Competition, front: Option<&FrontPage>) -> String {
+    let leader = front.and_then(|front| front.leader.as_ref());
+    let leads = leader.map(|leader| format!("{} leads with {} %. ", leader.team, leader.score));
+    format!("{}{}", leads.unwrap_or_default(), competition.summary)
 }
 
 /// `rows`: teams with their scores, in the order of the board.
@@ -90,17 +139,28 @@ pub(super) async fn overall(
     let today = app.store.stage(board.stage).await?;
     let today = today.day(app.config.clock.now());
     let timeline = BoardTimeline::load(&app, &visibility, &board, query.live).await?;
-    let context = Context::new(&board, timeline.previous_board.as_ref(), sort.is_by_rank());
+    let days = Days::new(&board, &timeline, &address);
+    let course = Course::load(&app, &visibility, &board, (days.shown, query.live)).await?;
+    let previous = timeline.previous_board.as_ref();
+    let context = Context::new(&board, previous, &course, sort.is_by_rank());
+    let groups = context.groups(|row| OverallRow::new(row, &context, &board.weights, &competition));
+    let front = match query == BoardPageQuery::default() {
+        true => Some(FrontPage::load(&app, &visibility, &board, (&groups, days.shown)).await?),
+        false => None,
+    };
     let page = OverallPage {
+        description: description(&competition, front.as_ref()),
+        front,
+        styles: [assets::EPISODES_STYLE.url(), assets::FRONT_STYLE.url()],
+        course: course.chart(&board),
+        downloads: Downloads::new(&board, &query),
         competition: competition.short_title.clone(),
         frame: Frame::for_app(&app, season.name, "/"),
         board_info: BoardInfo::load(&app, &board, &visibility, &address, season.paused).await?,
-        days: Days::new(&board, &timeline, &address),
-        commitment: season.commitment,
+        days,
         conditions: common_conditions(&board.rows),
-        comparison_day: timeline.previous_board.as_ref().map(|earlier| earlier.day),
-        has_ties: context.has_ties(),
-        groups: context.groups(|row| OverallRow::new(row, &context, &board.weights, &competition)),
+        comparison_day: previous.map(|earlier| earlier.day),
+        groups,
         baselines: baselines::rows(&board),
         progress: DayProgress::load(&app, &visibility, today, board.division.as_ref()).await?,
         disqualified: board.disqualified.clone(),
@@ -119,10 +179,14 @@ struct TaskPage {
     title: String,
     /// Aim of the task in one sentence.
     aim: String,
+    /// Elements of an SVG drawing; empty without one.
+    drawing: String,
+    styles: [&'static str; 2],
+    course: Option<TeamsChart>,
+    downloads: Downloads,
     /// Profile, episodes and rules of all rows; `None` if rows differ.
     conditions: Option<String>,
     comparison_day: Option<jiff::civil::Date>,
-    has_ties: bool,
     /// Headings of the columns of violations.
     violation_columns: Vec<String>,
     groups: Vec<Group<TaskRow>>,
@@ -159,16 +223,22 @@ pub(super) async fn by_task(
     board.rows.retain(|row| row.tasks.contains_key(&task));
     sort.apply(&mut board.rows, Some(task));
     let timeline = BoardTimeline::load(&app, &visibility, &board, query.live).await?;
-    let context = Context::new(&board, timeline.previous_board.as_ref(), sort.is_by_rank());
+    let days = Days::new(&board, &timeline, &address);
+    let course = Course::load(&app, &visibility, &board, (days.shown, query.live)).await?;
+    let previous = timeline.previous_board.as_ref();
+    let context = Context::new(&board, previous, &course, sort.is_by_rank());
     render_with_etag(&TaskPage {
+        styles: [assets::EPISODES_STYLE.url(), assets::FRONT_STYLE.url()],
+        course: course.chart(&board),
+        downloads: Downloads::new(&board, &query),
+        drawing: info.drawing.clone(),
         frame: Frame::for_app(&app, season.name, path.clone()),
         board_info: BoardInfo::load(&app, &board, &visibility, &address, season.paused).await?,
-        days: Days::new(&board, &timeline, &address),
+        days,
         title: info.title.clone(),
         aim: info.aim.clone(),
         conditions: common_conditions(&board.rows),
-        comparison_day: timeline.previous_board.as_ref().map(|earlier| earlier.day),
-        has_ties: context.has_ties(),
+        comparison_day: previous.map(|earlier| earlier.day),
         violation_columns: competition
             .violations
             .iter()

@@ -7,9 +7,11 @@ mod histogram;
 mod rate_chart;
 mod scale;
 mod score_chart;
+mod teams_chart;
 
 pub(super) use answer_time_chart::{AnswerTimeChart, TimeBin, TimeSummary};
 pub(super) use day_chart::{Bound, DayChart, DayValue};
 pub(super) use histogram::{Bins, Histogram};
 pub(super) use rate_chart::{LabelledRate, RateChart};
 pub(super) use score_chart::ScoreChart;
+pub(super) use teams_chart::TeamsChart;

@@ -29,6 +29,7 @@ mod game;
 mod game_row;
 mod head_to_head;
 mod help;
+mod highlight;
 mod join;
 mod not_found;
 mod organiser;

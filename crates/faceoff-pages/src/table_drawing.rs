@@ -45,7 +45,7 @@ impl TableOutline {
 }
 
 /// To millimetres, with y downwards as in SVG.
-fn to_svg([x, y]: Position) -> [f64; 2] {
+pub(super) fn to_svg([x, y]: Position) -> [f64; 2] {
     [(x * 1e3).round(), (-y * 1e3).round() + 0.0]
 }
 

@@ -16,6 +16,7 @@ use crate::{
     shared_cache::SharedCache,
     summaries::Summaries,
     upload_slots::UploadSlots,
+    views::highlight::Highlight,
 };
 use axum::http::HeaderMap;
 use faceoff_api::views::champion_shares::ChampionSharesView;
@@ -57,6 +58,8 @@ pub struct AppState {
     pub(crate) ratings: TournamentAnswers<Ratings>,
     /// Analyses of games by the artifact key of the game's clips, which never change.
     pub(crate) game_analyses: SharedCache<String, GameAnalysis>,
+    /// Highlights of evaluations by the artifact key of their clips, which never change; `None`: no success.
+    pub(crate) highlights: SharedCache<String, Option<Highlight>>,
     /// How often each team wins when a tournament is replayed with other seeds.
     pub(crate) champion_shares: TournamentAnswers<ChampionSharesView>,
     /// One permit: only one answer about a tournament is computed at a time, because the slots that run evaluations and games
@@ -92,6 +95,9 @@ const MAX_BOARDS: u64 = 100;
 /// Tournaments with answers in memory; a season has a few.
 const MAX_TOURNAMENTS: u64 = 20;
 
+/// Highlights in memory, some ten kilobytes each: of the first teams of some boards.
+const MAX_HIGHLIGHTS: u64 = 20;
+
 /// Size of the analyses in memory. Most have some ten kilobytes; those of a robot that violates a limit again and again have
 /// some hundred.
 const MAX_ANALYSIS_BYTES: u64 = 16 << 20;
@@ -115,6 +121,7 @@ impl AppState {
             answer_cache: answer_cache::new(),
             ratings: SharedCache::with_entries(MAX_TOURNAMENTS),
             game_analyses: SharedCache::with_bytes(MAX_ANALYSIS_BYTES, GameAnalysis::memory_bytes),
+            highlights: SharedCache::with_entries(MAX_HIGHLIGHTS),
             champion_shares: SharedCache::with_entries(MAX_TOURNAMENTS),
             tournament_computation: Semaphore::new(1),
             has_tournaments: AtomicBool::new(false),

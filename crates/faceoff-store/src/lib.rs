@@ -90,7 +90,7 @@ pub use operations::{
 pub use program::Program;
 pub use queries::{
     board::{BoardRecord, BoardScope},
-    board_days::BoardDays,
+    board_days::{BoardDays, DayScore},
     evaluations::EvaluationFilter,
     gauges::Gauges,
     queue_forecast::{EvaluationBacklog, QueueForecast, QueuePosition},

@@ -20,6 +20,8 @@ pub struct Competition {
     pub short_title: String,
     /// What agents do, in running text, such as "robot air hockey".
     pub subject: String,
+    /// What it is, as a sentence for visitors who have never heard of it.
+    pub summary: String,
     /// Versions of its simulator and of its scoring, oldest first: at least one. New evaluations have the last one.
     pub rulesets: Vec<RulesetInfo>,
     /// Are there clips of its episodes, so that they can be replayed?
@@ -67,6 +69,11 @@ pub struct TaskInfo {
     pub title: String,
     /// What the agent has to achieve, as a sentence.
     pub aim: String,
+    /// What a success is called in running text, such as "goal".
+    pub achievement: String,
+    /// What happens in it: elements of an SVG drawing of 120 × 64 units; empty without a drawing. Strokes have the classes `path` and
+    /// `arrow`, bodies `object`, `agent` and `other`, the surroundings `ground`.
+    pub drawing: String,
     /// Share of its success rate in the overall score, unless a stage has other weights. The shares sum to 1.
     pub weight: Millionths,
     /// Control steps of the longest episode.
@@ -485,6 +492,7 @@ mod tests {
             title: "Points".to_owned(),
             short_title: "Points".to_owned(),
             subject: "points".to_owned(),
+            summary: "A summary.".to_owned(),
             rulesets: vec![RulesetInfo {
                 ruleset: Ruleset::new("points-1"),
                 action_limit: ACTION_LIMIT,
@@ -495,6 +503,8 @@ mod tests {
                 task: Task::new("reach"),
                 title: "Reach".to_owned(),
                 aim: "Reach the target.".to_owned(),
+                achievement: "success".to_owned(),
+                drawing: String::new(),
                 weight: Millionths::new(1_000_000),
                 max_steps: 100,
                 control_step_s: 0.1,

@@ -65,7 +65,9 @@ impl OtherSeasonResult {
             let message: Value = serde_json::from_slice(&message.payload).expect("it is JSON");
             // A job whose lease ended is run again.
             if message["outcome"]["kind"] == "done"
-                && !results.iter().any(|result| result.episode() == first_outcome(&message))
+                && !results
+                    .iter()
+                    .any(|result| result.episode() == first_outcome(&message))
             {
                 results.push(Self::read(message, &data_dir));
             }

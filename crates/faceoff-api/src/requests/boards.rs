@@ -71,7 +71,7 @@ pub enum BoardFormat {
 }
 
 /// Query of a board page: the board, and how it is sorted.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BoardPageQuery {
     /// See [`BoardQuery::stage`].

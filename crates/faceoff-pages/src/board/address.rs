@@ -18,6 +18,10 @@ impl<'a> Address<'a> {
         }
     }
 
+    pub(super) fn path(&self) -> &str {
+        &self.path
+    }
+
     /// The board of another task, sorted by rank.
     pub(super) fn with_path(&self, path: &str) -> String {
         address(path, self.query, self.query.day, None)

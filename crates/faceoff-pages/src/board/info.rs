@@ -17,7 +17,7 @@ use faceoff_service::{
     problem::Problem,
     views::{stage, visibility::Visibility},
 };
-use faceoff_types::{Competition, DivisionName, Task, TaskWeights, TierBounds};
+use faceoff_types::{Competition, DivisionName, Task, TaskInfo, TaskWeights, TierBounds};
 use jiff::Timestamp;
 use std::iter;
 
@@ -28,7 +28,9 @@ pub(super) struct BoardInfo {
     pub(super) next_evaluation: Option<NextEvaluation>,
     /// The revision of the rules, if the stage has several.
     pub(super) rules: Option<String>,
-    /// Boards of other stages, and of other revisions of the rules of this one.
+    /// The stages, if there are several.
+    pub(super) stages: Vec<Tab>,
+    /// Boards of other revisions of the rules of this stage.
     pub(super) other_boards: Vec<OtherBoard>,
     /// Divisions with a board of their own; `division` is the shown one.
     pub(super) divisions: Vec<DivisionName>,
@@ -59,6 +61,8 @@ pub(super) struct BoardInfo {
     pub(super) is_hidden: bool,
     pub(super) result_status: String,
     pub(super) is_provisional: bool,
+    /// The tasks with columns of their own; empty on the board of a task.
+    pub(super) task_columns: Vec<TaskInfo>,
     /// The overall board and the boards of the tasks.
     pub(super) tabs: Vec<Tab>,
 }
@@ -87,27 +91,23 @@ impl BoardInfo {
         let stages = stage::all(app).await?;
         let mut other_boards = Vec::new();
         let mut info = None;
+        let stage_tab = |stage: &StageView| Tab {
+            name: stage.name.to_string(),
+            address: format!("{}?stage={}", address.path(), stage.id),
+            is_shown: stage.id == board.stage,
+        };
+        let stage_tabs = match &stages[..] {
+            [_, _, ..] => stages.iter().map(stage_tab).collect(),
+            _ => Vec::new(),
+        };
         for stage in stages {
-            let is_shown = stage.id == board.stage;
-            for rules in &stage.revisions {
-                let newest = rules.revision == stage.rules.revision;
-                if is_shown && rules.revision == board.revision || (!is_shown && !newest) {
-                    continue;
-                }
-                other_boards.push(OtherBoard {
-                    label: if is_shown {
-                        format!("{}, rules of {}", stage.name, utc_minute(rules.since))
-                    } else {
-                        stage.name.to_string()
-                    },
-                    query: if is_shown {
-                        format!("?stage={}&revision={}", stage.id, rules.revision)
-                    } else {
-                        format!("?stage={}", stage.id)
-                    },
-                });
-            }
-            if is_shown {
+            if stage.id == board.stage {
+                let others = stage.revisions.iter();
+                let others = others.filter(|rules| rules.revision != board.revision);
+                other_boards.extend(others.map(|rules| OtherBoard {
+                    label: format!("rules of {}", utc_minute(rules.since)),
+                    query: format!("?stage={}&revision={}", stage.id, rules.revision),
+                }));
                 info = Some(Self {
                     dates: stage_dates(&stage),
                     next_evaluation: stage.next_cutoff.as_ref().map(NextEvaluation::new),
@@ -119,6 +119,7 @@ impl BoardInfo {
                         )
                     }),
                     stage: stage.name.to_string(),
+                    stages: Vec::new(),
                     other_boards: Vec::new(),
                     divisions: app.store.divisions().await?,
                     division: board.division.clone(),
@@ -136,12 +137,17 @@ impl BoardInfo {
                     is_hidden,
                     result_status: board_status::result_status(board),
                     is_provisional: board.provisional,
+                    task_columns: match board.task {
+                        Some(_) => Vec::new(),
+                        None => app.config.competition().tasks.clone(),
+                    },
                     tabs: tabs(app.config.competition(), board.task, address),
                 });
             }
         }
         let info = info.ok_or_else(|| Problem::internal("board without its stage"))?;
         Ok(Self {
+            stages: stage_tabs,
             other_boards,
             paused,
             ..info

@@ -1,5 +1,6 @@
 //! Rows of a board as text, grouped by tier if the competition has tiers.
 
+use super::course::{Course, Sparkline};
 use crate::figures::{self, Rate, TierLabel};
 use faceoff_api::views::{
     board::{BoardRow, BoardView},
@@ -15,11 +16,14 @@ const MIN_SHOWN_TIER_CHANGE: f64 = 0.01;
 
 /// The team of a row with its rank.
 pub(super) struct TeamCell {
-    pub(super) rank: u32,
+    /// The rank; that of the first one with `=` for teams that are statistically tied.
+    pub(super) rank: String,
     /// Change since the day before, if the board has one.
     pub(super) change: Option<RankChange>,
     /// The first team of the *rank group*, the teams that are statistically tied; `None` for the first team itself and without a tie.
     pub(super) tied_with: Option<String>,
+    /// The scores of the days; `None` with fewer than two.
+    pub(super) sparkline: Option<Sparkline>,
     /// Probability of another tier; `None` below [`MIN_SHOWN_TIER_CHANGE`] and for means of several days.
     pub(super) tier_change: Option<String>,
     pub(super) team: String,
@@ -91,10 +95,11 @@ pub(super) struct Context<'a> {
     board: &'a BoardView,
     /// The board of the day before.
     earlier: Option<&'a EarlierBoard>,
+    course: &'a Course,
     has_common_conditions: bool,
     is_by_rank: bool,
-    /// The first team of each rank group with several teams.
-    leaders: BTreeMap<u32, TeamId>,
+    /// Rank and id of the first team of each rank group with several teams.
+    leaders: BTreeMap<u32, (u32, TeamId)>,
 }
 
 impl<'a> Context<'a> {
@@ -102,6 +107,7 @@ impl<'a> Context<'a> {
     pub(super) fn new(
         board: &'a BoardView,
         earlier: Option<&'a EarlierBoard>,
+        course: &'a Course,
         is_by_rank: bool,
     ) -> Self {
         let mut groups: BTreeMap<u32, Vec<&BoardRow>> = BTreeMap::new();
@@ -111,24 +117,20 @@ impl<'a> Context<'a> {
         groups.retain(|_, rows| rows.len() > 1);
         let leaders = groups.into_iter().filter_map(|(group, rows)| {
             let first = rows.into_iter().min_by_key(|row| row.rank)?;
-            Some((group, first.team_id))
+            Some((group, (first.rank, first.team_id)))
         });
         Self {
             board,
             earlier,
+            course,
             has_common_conditions: common_conditions(&board.rows).is_some(),
             is_by_rank,
             leaders: leaders.collect(),
         }
     }
 
-    /// Are teams statistically tied?
-    pub(super) fn has_ties(&self) -> bool {
-        !self.leaders.is_empty()
-    }
-
     fn tied_with(&self, row: &BoardRow) -> Option<String> {
-        let leader = self.leaders.get(&row.rank_group)?;
+        let (_, leader) = self.leaders.get(&row.rank_group)?;
         let rows = self.board.rows.iter();
         let mut others = rows.filter(|other| other.team_id != row.team_id);
         let leader = others.find(|other| other.team_id == *leader)?;
@@ -169,7 +171,11 @@ impl<'a> Context<'a> {
     fn team_cell(&self, row: &BoardRow) -> TeamCell {
         let tier_change = row.tier_change_probability;
         TeamCell {
-            rank: row.rank,
+            rank: match self.leaders.get(&row.rank_group) {
+                Some((first_rank, _)) => format!("{first_rank}="),
+                None => row.rank.to_string(),
+            },
+            sparkline: self.course.sparkline(row.team_id),
             change: self.change(row),
             tied_with: self.tied_with(row),
             tier_change: tier_change
@@ -330,7 +336,8 @@ mod tests {
     type TextGroup = (Option<Tier>, Vec<String>, Vec<Option<Tier>>);
 
     fn groups(board: &BoardView, is_by_rank: bool) -> Vec<TextGroup> {
-        let context = Context::new(board, None, is_by_rank);
+        let course = Course::default();
+        let context = Context::new(board, None, &course, is_by_rank);
         let groups = context.groups(|row| context.team_cell(row));
         let summary = |group: Group<TeamCell>| {
             let teams = group.rows.iter().map(|cell| cell.team.clone()).collect();

@@ -15,6 +15,8 @@ pub(super) struct SortableColumn {
     /// Unit of the column; empty without one.
     pub(super) unit: &'static str,
     pub(super) class: &'static str,
+    /// Id of the element that explains it (`board_about.html`); `None` if the title does.
+    pub(super) about: Option<String>,
     /// The board sorted by this column; in the other direction if it is already.
     pub(super) address: String,
     /// `ascending` or `descending` if the board is sorted by this column; the value of `aria-sort`.
@@ -91,6 +93,7 @@ impl Sort {
                 title: title.to_owned(),
                 unit,
                 class,
+                about: (column != BoardColumn::Team).then(|| format!("about-{}", column.as_str())),
                 address: address.with_sort(sort),
                 direction: is_sorted.then_some(if is_ascending {
                     "ascending"

@@ -26,6 +26,7 @@ pub mod feed;
 pub mod game;
 pub mod game_clips;
 pub mod health;
+pub mod highlight;
 pub mod history;
 pub mod invitation;
 pub mod live_game;

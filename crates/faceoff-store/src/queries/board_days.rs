@@ -7,8 +7,8 @@ use crate::{
     queries::board::{BoardRecord, BoardScope, select_board},
     store::Store,
 };
-use faceoff_types::StageId;
-use jiff::Timestamp;
+use faceoff_types::{StageId, Task, TeamId};
+use jiff::{Timestamp, civil::Date};
 use sqlx::types::Text;
 
 /// The days of a stage from which its board is computed.
@@ -21,7 +21,65 @@ pub enum BoardDays {
     Final,
 }
 
+/// A team's score of an evaluation day.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DayScore {
+    pub team: TeamId,
+    pub day: Date,
+    /// In percent: the overall score, or the task's success rate.
+    pub score: f64,
+}
+
 impl Store {
+    /// The scores of the teams on a board from `first_day` on, or their success rates in a task, by day. Baselines are left out.
+    #[boxed]
+    pub async fn day_scores(
+        &self,
+        stage: StageId,
+        revision: u32,
+        scope: &BoardScope,
+        (task, first_day): (Option<Task>, Date),
+    ) -> Result<Vec<DayScore>> {
+        let (path, scale) = match task {
+            Some(task) => (format!("$.tasks.\"{task}\".success_rate"), 100.0),
+            None => ("$.score".to_owned(), 1.0),
+        };
+        let rows = sqlx::query!(
+            r#"SELECT e.team_id AS "team!: TeamId", e.day AS "day!: Text<Date>", json_extract(e.result, ?6) AS "score: f64"
+               FROM counting_evaluations e
+               JOIN teams t ON t.id = e.team_id
+               JOIN stages g ON g.id = e.stage_id
+               WHERE e.stage_id = ?1 AND e.revision = ?2 AND e.state = 'finished' AND e.voided_at IS NULL
+                 AND (?3 IS NULL OR e.finished_at <= ?3) AND (?4 IS NULL OR e.day <= ?4) AND e.day >= ?5
+                 AND NOT t.is_baseline
+                 AND CASE WHEN g.finalised_at IS NULL THEN t.disqualified_at IS NULL
+                          ELSE t.id NOT IN (SELECT value FROM json_each(g.finalised_without)) END
+               ORDER BY e.day, t.name"#,
+            stage,
+            revision,
+            scope.finished_until.map(Instant),
+            scope.last_day.map(Text),
+            Text(first_day),
+            path,
+        );
+        let rows = rows
+            .fetch_all(&mut *self.database.read.acquire().await?)
+            .await?;
+        let score = |row: _| {
+            let (team, day, score): (TeamId, Text<Date>, Option<f64>) = row;
+            // Not every evaluation has each task.
+            score.map(|score| DayScore {
+                team,
+                day: day.0,
+                score: scale * score,
+            })
+        };
+        Ok(rows
+            .into_iter()
+            .filter_map(|row| score((row.team, row.day, row.score)))
+            .collect())
+    }
+
     /// The cutoff (the start of the evaluations) of a stage's final day; `None` before it.
     #[boxed]
     pub async fn final_cutoff(&self, stage: StageId) -> Result<Option<Timestamp>> {

@@ -30,6 +30,8 @@ impl PointMass {
             task,
             title: title.to_owned(),
             aim: aim.to_owned(),
+            achievement: "arrival".to_owned(),
+            drawing: String::new(),
             weight: Millionths::new(500_000),
             max_steps: 80,
             control_step_s: STEP_S,
@@ -52,6 +54,7 @@ impl PointMass {
                 title: "Point Mass Challenge".to_owned(),
                 short_title: "Point Mass".to_owned(),
                 subject: "pushing a point mass".to_owned(),
+                summary: "Programs push a point mass.".to_owned(),
                 has_replays: false,
                 has_games: false,
                 tasks: vec![

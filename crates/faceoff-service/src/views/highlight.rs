@@ -1,0 +1,98 @@
+//! The highlight of a board: the quickest success of its first team whose episodes are visible.
+
+use crate::{
+    app::AppState,
+    boxed,
+    problem::{Problem, ProblemKind},
+    views::{clips::Clips, visibility::Visibility},
+};
+use faceoff_api::views::board::BoardRow;
+use faceoff_replay::{Clip, ClipKey, EpisodeLine, Pack, ReplayError};
+use faceoff_types::{Competition, EvaluationId, Task};
+use std::{cmp::Reverse, sync::Arc};
+
+/// Teams whose episodes are looked at, from the first of the board on.
+const MAX_TEAMS: usize = 3;
+
+/// An episode that ended in success, with its motion.
+#[derive(Debug)]
+pub struct Highlight {
+    pub task: Task,
+    pub episode: u32,
+    /// Control steps of the episode.
+    pub steps: u32,
+    pub motion: Clip,
+}
+
+/// A highlight with its team.
+#[derive(Debug)]
+pub struct TeamHighlight {
+    pub team: String,
+    pub evaluation: EvaluationId,
+    pub highlight: Arc<Option<Highlight>>,
+}
+
+/// The highlight of a board with these rows; `None` if no success of the first teams is visible to the viewer.
+///
+/// # Errors
+/// If the data cannot be read.
+#[boxed]
+pub async fn of_board(
+    app: &AppState,
+    visibility: &Visibility,
+    rows: &[BoardRow],
+) -> Result<Option<TeamHighlight>, Problem> {
+    for row in rows.iter().take(MAX_TEAMS) {
+        let clips = match Clips::find(app, visibility, row.evaluation).await {
+            Ok(clips) => clips,
+            Err(problem) if problem.kind() == ProblemKind::Internal => return Err(problem),
+            // Not yet visible, removed, or never recorded.
+            Err(_) => continue,
+        };
+        let competition = Arc::clone(app.config.competition());
+        let find = async {
+            let found = clips
+                .file
+                .read(move |pack| quickest_success(pack, &competition));
+            Ok::<_, Problem>(Arc::new(found.await?))
+        };
+        let highlight = app.highlights.get(clips.file.key.clone(), find).await?;
+        if highlight.is_some() {
+            return Ok(Some(TeamHighlight {
+                team: row.team.to_string(),
+                evaluation: row.evaluation,
+                highlight,
+            }));
+        }
+    }
+    Ok(None)
+}
+
+/// The quickest success of the task with the largest share in the score; of two such tasks, of the one that comes first.
+fn quickest_success(
+    pack: &Pack,
+    competition: &Competition,
+) -> Result<Option<Highlight>, ReplayError> {
+    let index = pack.clip_index()?;
+    let mut tasks: Vec<_> = competition.tasks.iter().collect();
+    tasks.sort_by_key(|info| Reverse(info.weight));
+    let successes = |task| {
+        let lines = index.episodes.iter();
+        lines.filter(move |line| line.task == task && line.success && line.has_clips())
+    };
+    let quickest: Option<&EpisodeLine> = tasks
+        .iter()
+        .find_map(|info| successes(info.task).min_by_key(|line| (line.steps, line.episode)));
+    let Some(line) = quickest else {
+        return Ok(None);
+    };
+    let Some(bytes) = pack.clip(ClipKey::motion(line.task, line.episode))? else {
+        return Ok(None);
+    };
+    Ok(Some(Highlight {
+        task: line.task,
+        episode: line.episode,
+        steps: line.steps,
+        motion: Clip::read(&bytes)?,
+    }))
+}
