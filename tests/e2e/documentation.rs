@@ -59,13 +59,19 @@ fn listings_are_copied_without_prompts() {
         "getSelection().selectAllChildren(document.querySelector('pre:has(.prompt)')), getSelection().toString()",
     );
     let selected = selected.as_str().expect("a selection is text");
-    assert!(!selected.contains('$') && selected.contains("apt-get"), "{selected}");
+    assert!(
+        !selected.contains('$') && selected.contains("apt-get"),
+        "{selected}"
+    );
     // Without scripts there is nothing to press.
     let plain = browser.open_in(
         View::PHONE.without_scripts(),
         &format!("{}/docs/start", server.url),
     );
-    assert_eq!(plain.evaluate("document.querySelector('.listing button')"), serde_json::Value::Null);
+    assert_eq!(
+        plain.evaluate("document.querySelector('.listing button')"),
+        serde_json::Value::Null
+    );
 }
 
 #[test]
@@ -137,9 +143,7 @@ fn list_of_pages_is_beside_wide_text_only() {
         assert_eq!(state["summary"], !is_wide, "{width}: {state}");
         if is_wide {
             // The list begins near the current page, although it is longer than the window.
-            page.wait_until(
-                "document.querySelector('.side').scrollTop > 0",
-            );
+            page.wait_until("document.querySelector('.side-list').scrollTop > 0");
             assert_eq!(state["inWindow"], true, "{width}: {state}");
         }
     }

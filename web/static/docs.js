@@ -1,5 +1,5 @@
-// Script of the documentation: buttons that copy listings, and a list of pages that begins at the current one. Without JavaScript
-// the pages are complete.
+// Script of the documentation: buttons that copy listings, and a list of all pages that begins near the current one. Without
+// JavaScript the pages are complete.
 
 const COPIED_MS = 2000;
 
@@ -42,7 +42,7 @@ function addButton(listing) {
   listing.after(button);
 }
 
-// Scrolls the list beside the text, not the page.
+// Scrolls the list, not the page.
 function showCurrent(list) {
   const current = list.querySelector("[aria-current]");
   if (!current) return;
@@ -50,4 +50,7 @@ function showCurrent(list) {
 }
 
 document.querySelectorAll(".listing > pre").forEach(addButton);
-document.querySelectorAll(".side").forEach(showCurrent);
+for (const list of document.querySelectorAll(".side-list")) {
+  showCurrent(list);
+  list.parentElement.addEventListener("toggle", () => showCurrent(list));
+}

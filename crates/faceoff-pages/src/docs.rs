@@ -77,7 +77,7 @@ impl Documentation {
     }
 
     /// Head of the page with this path. `headings`: id and title of each of its headings.
-    fn head<'a>(&'a self, path: String, headings: Vec<(&'a str, &'a str)>) -> DocsHead<'a> {
+    fn head<'a>(&'a self, path: String, headings: Vec<(&'a str, String)>) -> DocsHead<'a> {
         DocsHead {
             side: Some(SideList::new(self.outline(), path, headings)),
             ..DocsHead::new()
@@ -185,13 +185,13 @@ async fn document(
         )));
     };
     let headings = page.contents.iter();
-    let headings = headings.map(|entry| (&*entry.id, &*entry.title)).collect();
+    let headings = headings.map(|entry| (&*entry.id, entry.title.clone()));
     let (previous, next) = library::neighbours(page);
     respond(
         &conditions,
         &DocumentPage {
             frame: frame(&app),
-            docs: documentation.head(page.path(), headings),
+            docs: documentation.head(page.path(), headings.collect()),
             page,
             previous,
             next,
@@ -212,11 +212,12 @@ async fn api_reference(
     Extension(documentation): Extension<Arc<Documentation>>,
     conditions: RequestPreconditions,
 ) -> Result<Response, PageProblem> {
+    let headings = REFERENCE_HEADINGS.map(|(id, title)| (id, title.to_owned()));
     respond(
         &conditions,
         &ReferencePage {
             frame: frame(&app),
-            docs: documentation.head(reference::PATH.into(), REFERENCE_HEADINGS.into()),
+            docs: documentation.head(reference::PATH.into(), headings.into()),
             reference: documentation.reference(),
         },
     )
@@ -244,12 +245,16 @@ async fn operations(
         )));
     };
     let headings = group.operations.iter();
-    let headings = headings.map(|operation| (&*operation.id, &*operation.title)).collect();
+    // Without the base, which all paths have.
+    let headings = headings.map(|operation| {
+        let title = operation.title.replacen(" /api/v1/", " /", 1);
+        (&*operation.id, title)
+    });
     respond(
         &conditions,
         &OperationsPage {
             frame: frame(&app),
-            docs: documentation.head(group.path(), headings),
+            docs: documentation.head(group.path(), headings.collect()),
             group,
         },
     )

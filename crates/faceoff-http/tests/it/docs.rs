@@ -267,7 +267,10 @@ async fn search_finds_sections_and_marks_words() {
     let page = search(&site, "board").await;
     let kinds = select_all(&page, "main h2").into_iter().map(text_of);
     let kinds: Vec<String> = kinds
-        .map(|kind| kind.trim_end_matches(|c: char| c == ' ' || c.is_ascii_digit()).into())
+        .map(|kind| {
+            kind.trim_end_matches(|c: char| c == ' ' || c.is_ascii_digit())
+                .into()
+        })
         .collect();
     assert_eq!(kinds, ["Documents", "API operations", "API schemas"]);
     let lead = text_of(select_all(&page, ".lead")[0]);
@@ -304,12 +307,15 @@ async fn search_knows_questions_forms_slips_and_synonyms() {
         let page = search(&site, query).await;
         let links = attributes(&page, ".search-results li a", "href");
         let best = &links[..links.len().min(8)];
-        assert!(best.iter().any(|link| link == expected), "{query}: {best:?}");
+        assert!(
+            best.iter().any(|link| link == expected),
+            "{query}: {best:?}"
+        );
     }
     let page = search(&site, "the tournamant").await;
     let lead = text_of(select_all(&page, ".lead")[0]);
     for text in [
-        "Showing results for the tournament.",
+        "Showing results for “the tournament”.",
         "Nothing contains “tournamant”.",
     ] {
         assert!(lead.contains(text), "{lead}");
@@ -329,7 +335,10 @@ async fn listings_are_coloured_and_prompts_are_apart() {
         .into_iter()
         .map(text_of)
         .collect();
-    assert!(commands.iter().any(|command| command == "faceoff submit ."), "{commands:?}");
+    assert!(
+        commands.iter().any(|command| command == "faceoff submit ."),
+        "{commands:?}"
+    );
     let prompts = select_all(&page, "pre .prompt");
     assert_eq!(prompts.len(), commands.len());
     assert!(!commands.iter().any(|command| command.starts_with('$')));

@@ -59,9 +59,9 @@ const PYTHON: Language = Language {
     strings: &["\"\"\"", "'''", "\"", "'"],
     raw_string: None,
     keywords: &[
-        "and", "as", "assert", "break", "class", "continue", "def", "elif", "else", "except", "False", "finally", "for",
-        "from", "if", "import", "in", "is", "lambda", "None", "not", "or", "pass", "raise", "return", "True", "try",
-        "while", "with", "yield",
+        "and", "as", "assert", "break", "class", "continue", "def", "elif", "else", "except",
+        "False", "finally", "for", "from", "if", "import", "in", "is", "lambda", "None", "not",
+        "or", "pass", "raise", "return", "True", "try", "while", "with", "yield",
     ],
     ..PLAIN
 };
@@ -71,9 +71,9 @@ const RUST: Language = Language {
     strings: &["\""],
     raw_string: None,
     keywords: &[
-        "as", "async", "await", "const", "else", "enum", "false", "fn", "for", "if", "impl", "in", "let", "loop", "match",
-        "mod", "move", "mut", "pub", "ref", "return", "self", "Self", "static", "struct", "trait", "true", "type", "use",
-        "where", "while",
+        "as", "async", "await", "const", "else", "enum", "false", "fn", "for", "if", "impl", "in",
+        "let", "loop", "match", "mod", "move", "mut", "pub", "ref", "return", "self", "Self",
+        "static", "struct", "trait", "true", "type", "use", "where", "while",
     ],
     ..PLAIN
 };
@@ -97,7 +97,9 @@ fn session(shell: &Language, code: &str) -> String {
             .strip_suffix('\n')
             .map_or((command, ""), |command| (command, "\n"));
         let command = coloured(shell, command);
-        format!("<span class=\"prompt\">{PROMPT}</span><span class=\"command\">{command}</span>{end}")
+        format!(
+            "<span class=\"prompt\">{PROMPT}</span><span class=\"command\">{command}</span>{end}"
+        )
     });
     lines.collect()
 }
@@ -152,7 +154,10 @@ impl Language {
         }
         if first.is_ascii_digit() {
             let end = rest.find(|c| !is_of_word(c) && c != '.');
-            return (end.unwrap_or(rest.len()), self.has_numbers.then_some("number"));
+            return (
+                end.unwrap_or(rest.len()),
+                self.has_numbers.then_some("number"),
+            );
         }
         let length = rest.find(|c| !is_of_word(c)).unwrap_or(rest.len());
         let (word, after) = rest.split_at(length);
@@ -170,7 +175,9 @@ impl Language {
         let mut delimiters = self.strings.iter();
         let delimiter = delimiters.find(|delimiter| rest.starts_with(**delimiter))?;
         let has_lines = self.is_shell || delimiter.len() > 1;
-        let has_escapes = self.raw_string.is_none_or(|raw| !delimiter.starts_with(raw));
+        let has_escapes = self
+            .raw_string
+            .is_none_or(|raw| !delimiter.starts_with(raw));
         let mut end = delimiter.len();
         while !rest[end..].starts_with(delimiter) {
             let c = rest[end..].chars().next()?;
@@ -231,22 +238,51 @@ mod tests {
             (
                 "sh",
                 "for f in *.md; do\n  echo \"a # b\" 'c\nd' 12 # it's\ndone x#y do",
-                &["keyword for", "keyword do", "string \"a # b\"", "string 'c\nd'", "comment # it's", "keyword done"][..],
+                &[
+                    "keyword for",
+                    "keyword do",
+                    "string \"a # b\"",
+                    "string 'c\nd'",
+                    "comment # it's",
+                    "keyword done",
+                ][..],
             ),
             (
                 "toml",
                 "[a.b]   # no key = here\nc = { d = 1.5 }\ne = [\"f\", true]",
-                &["key a", "key b", "comment # no key = here", "key c", "key d", "number 1.5", "key e", "string \"f\"", "keyword true"],
+                &[
+                    "key a",
+                    "key b",
+                    "comment # no key = here",
+                    "key c",
+                    "key d",
+                    "number 1.5",
+                    "key e",
+                    "string \"f\"",
+                    "keyword true",
+                ],
             ),
             (
                 "json",
                 r#"{"a": ["b:", -2e3, null], "c\"d" : …}"#,
-                &["key \"a\"", "string \"b:\"", "number 2e3", "keyword null", r#"key "c\"d""#],
+                &[
+                    "key \"a\"",
+                    "string \"b:\"",
+                    "number 2e3",
+                    "keyword null",
+                    r#"key "c\"d""#,
+                ],
             ),
             (
                 "python",
                 "def f(x1):\n  return '''it\n's''' + 'a' # \"b\"\nisnot = \"open\n",
-                &["keyword def", "keyword return", "string '''it\n's'''", "string 'a'", "comment # \"b\""],
+                &[
+                    "keyword def",
+                    "keyword return",
+                    "string '''it\n's'''",
+                    "string 'a'",
+                    "comment # \"b\"",
+                ],
             ),
             (
                 "rust",
@@ -263,7 +299,9 @@ mod tests {
     #[test]
     fn code_is_complete_and_escaped() {
         let code = "a < b && 'c>' # é \"\n\t… \\";
-        for language in ["sh", "toml", "json", "python", "rust", "yaml", "console", ""] {
+        for language in [
+            "sh", "toml", "json", "python", "rust", "yaml", "console", "",
+        ] {
             let html = listing(language, code);
             let text: String = html
                 .split('<')

@@ -47,17 +47,17 @@ pub(super) fn outline(reference: &Reference) -> Vec<OutlineGroup> {
     );
     let reference = OutlineGroup {
         name: "API",
-        entries: [overview].into_iter().chain(operations).chain([schemas]).collect(),
+        entries: [overview]
+            .into_iter()
+            .chain(operations)
+            .chain([schemas])
+            .collect(),
     };
     documents.chain([reference]).collect()
 }
 
 impl OutlineEntry {
-    fn new(
-        title: impl Into<String>,
-        path: impl Into<String>,
-        summary: impl Into<String>,
-    ) -> Self {
+    fn new(title: impl Into<String>, path: impl Into<String>, summary: impl Into<String>) -> Self {
         Self {
             title: title.into(),
             path: path.into(),
@@ -73,14 +73,14 @@ pub(super) struct SideList<'a> {
     /// Path of the page.
     current: String,
     /// Id and title of each heading of the page.
-    pub(super) headings: Vec<(&'a str, &'a str)>,
+    pub(super) headings: Vec<(&'a str, String)>,
 }
 
 impl<'a> SideList<'a> {
     pub(super) fn new(
         groups: &'a [OutlineGroup],
         current: String,
-        headings: Vec<(&'a str, &'a str)>,
+        headings: Vec<(&'a str, String)>,
     ) -> Self {
         Self {
             groups,

@@ -49,7 +49,8 @@ pub(super) struct Correction {
 
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct SearchResult {
-    pub(super) page: String,
+    /// Title of the page; `None` if it is the heading.
+    pub(super) page: Option<String>,
     pub(super) href: String,
     pub(super) heading: Vec<Piece>,
     pub(super) snippet: Vec<Piece>,
@@ -150,7 +151,11 @@ impl Index {
                 let score = if term.is_synonym {
                     let is_heading = is_title || posting.in_heading;
                     Score {
-                        synonyms: if is_heading { MAX_COUNTED_OCCURRENCES } else { occurrences },
+                        synonyms: if is_heading {
+                            MAX_COUNTED_OCCURRENCES
+                        } else {
+                            occurrences
+                        },
                         ..Score::default()
                     }
                 } else {
@@ -189,7 +194,7 @@ impl Index {
         };
         let shown = hits.iter().take(MAX_RESULTS_OF_A_KIND);
         let results = shown.map(|(hit, section)| SearchResult {
-            page: section.page.clone(),
+            page: (!section.is_start()).then(|| section.page.clone()),
             href: section.href.clone(),
             heading: pieces(&section.heading, is_match),
             snippet: match hit.first {

@@ -140,7 +140,10 @@ mod tests {
         let mut stems = HashSet::new();
         for (word, others) in SYNONYMS {
             assert!(stems.insert(stem(word)), "{word}");
-            assert!(others.iter().all(|other| stem(other) != stem(word)), "{word}");
+            assert!(
+                others.iter().all(|other| stem(other) != stem(word)),
+                "{word}"
+            );
         }
     }
 }

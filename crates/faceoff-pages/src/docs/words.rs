@@ -4,10 +4,11 @@ use std::ops::Range;
 
 /// Words of questions that say nothing about the subject. A query of these words alone is searched as it is.
 const STOP_WORDS: [&str; 62] = [
-    "a", "about", "all", "an", "and", "any", "are", "as", "at", "be", "by", "can", "could", "do", "does", "for",
-    "from", "get", "has", "have", "how", "i", "if", "in", "into", "is", "it", "its", "me", "my", "of", "on", "or",
-    "our", "should", "so", "that", "the", "their", "there", "these", "they", "this", "to", "use", "was", "we",
-    "what", "when", "where", "which", "who", "why", "will", "with", "work", "works", "would", "you", "your", "s", "t",
+    "a", "about", "all", "an", "and", "any", "are", "as", "at", "be", "by", "can", "could", "do",
+    "does", "for", "from", "get", "has", "have", "how", "i", "if", "in", "into", "is", "it", "its",
+    "me", "my", "of", "on", "or", "our", "should", "so", "that", "the", "their", "there", "these",
+    "they", "this", "to", "use", "was", "we", "what", "when", "where", "which", "who", "why",
+    "will", "with", "work", "works", "would", "you", "your", "s", "t",
 ];
 
 pub(super) fn is_stop_word(word: &str) -> bool {
@@ -127,7 +128,14 @@ mod tests {
             &["policy", "policies"],
             &["class", "classes"],
             &["match", "matches", "matched", "matching"],
-            &["evaluate", "evaluates", "evaluated", "evaluating", "evaluation", "evaluations"],
+            &[
+                "evaluate",
+                "evaluates",
+                "evaluated",
+                "evaluating",
+                "evaluation",
+                "evaluations",
+            ],
             &["stop", "stops", "stopped", "stopping"],
             &["retry", "retries", "retried", "retrying"],
             &["use", "uses", "used", "using"],
@@ -140,7 +148,10 @@ mod tests {
             &["id", "ids"],
         ] {
             let stems: Vec<String> = forms.iter().map(|form| stem(form)).collect();
-            assert!(stems.iter().all(|other| *other == stems[0]), "{forms:?}: {stems:?}");
+            assert!(
+                stems.iter().all(|other| *other == stems[0]),
+                "{forms:?}: {stems:?}"
+            );
         }
     }
 
@@ -165,7 +176,10 @@ mod tests {
     fn words_and_names_are_split() {
         let text = "joint_vel-limit: ≤ 2.5 µm, BoardView.";
         let split: Vec<&str> = words(text).map(|word| &text[word]).collect();
-        assert_eq!(split, ["joint", "vel", "limit", "2", "5", "µm", "BoardView"]);
+        assert_eq!(
+            split,
+            ["joint", "vel", "limit", "2", "5", "µm", "BoardView"]
+        );
         let split = |name: &'static str| -> Vec<&str> {
             parts(name).into_iter().map(|part| &name[part]).collect()
         };

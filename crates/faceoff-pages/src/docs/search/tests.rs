@@ -90,14 +90,24 @@ fn documents_come_before_operations_and_schemas() {
         of_kind(SectionKind::Document, "Prose"),
     ]);
     let found = index.search("puck");
-    let kinds: Vec<(&str, usize)> = found.kinds.iter().map(|kind| (kind.name, kind.count)).collect();
-    assert_eq!(kinds, [("Documents", 1), ("API operations", 1), ("API schemas", 1)]);
+    let kinds: Vec<(&str, usize)> = found
+        .kinds
+        .iter()
+        .map(|kind| (kind.name, kind.count))
+        .collect();
+    assert_eq!(
+        kinds,
+        [("Documents", 1), ("API operations", 1), ("API schemas", 1)]
+    );
     assert_eq!(headings(&index, "puck"), ["Prose", "GET puck", "Puck"]);
 }
 
 #[test]
 fn other_forms_of_a_word_are_found_and_marked() {
-    let index = Index::new([section("Days", "Evaluated: ≤ 2 evaluations, BoardView2.boards µ")]);
+    let index = Index::new([section(
+        "Days",
+        "Evaluated: ≤ 2 evaluations, BoardView2.boards µ",
+    )]);
     let found = index.search("evaluating board µ");
     assert_eq!(
         marked(&results(&found)[0].snippet),
