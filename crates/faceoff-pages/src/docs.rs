@@ -34,7 +34,7 @@ use faceoff_service::{
 use library::{LIBRARY, Page};
 use outline::{OutlineGroup, SideList, outline};
 use reference::{Reference, Schema, TokenRequirement, TypePart};
-use search::{Found, Index};
+use search::{Index, SearchResults};
 use serde::Deserialize;
 use serde_json::Value;
 use std::sync::{Arc, OnceLock};
@@ -325,7 +325,7 @@ struct SearchQuery {
 struct SearchPage<'a> {
     frame: Frame,
     docs: DocsHead<'a>,
-    found: Found,
+    found: SearchResults,
 }
 
 async fn search_page(

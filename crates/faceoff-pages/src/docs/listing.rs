@@ -79,16 +79,16 @@ const RUST: Language = Language {
 };
 
 /// The HTML of a listing. `language`: the word after its fence.
-pub(super) fn listing(language: &str, code: &str) -> String {
+pub(super) fn render_listing(language: &str, code: &str) -> String {
     match Language::named(language) {
-        Some(shell) if language == "console" => session(shell, code),
-        Some(language) => coloured(language, code),
+        Some(shell) if language == "console" => render_session(shell, code),
+        Some(language) => colour(language, code),
         None => escape(code),
     }
 }
 
 /// Commands and their output.
-fn session(shell: &Language, code: &str) -> String {
+fn render_session(shell: &Language, code: &str) -> String {
     let lines = code.split_inclusive('\n').map(|line| {
         let Some(command) = line.strip_prefix(PROMPT) else {
             return escape(line);
@@ -96,7 +96,7 @@ fn session(shell: &Language, code: &str) -> String {
         let (command, end) = command
             .strip_suffix('\n')
             .map_or((command, ""), |command| (command, "\n"));
-        let command = coloured(shell, command);
+        let command = colour(shell, command);
         format!(
             "<span class=\"prompt\">{PROMPT}</span><span class=\"command\">{command}</span>{end}"
         )
@@ -104,7 +104,7 @@ fn session(shell: &Language, code: &str) -> String {
     lines.collect()
 }
 
-fn coloured(language: &Language, code: &str) -> String {
+fn colour(language: &Language, code: &str) -> String {
     let mut out = String::with_capacity(code.len() * 3 / 2);
     // Up to `done` the code is written; up to `position` it is read.
     let (mut done, mut position) = (0, 0);
@@ -222,7 +222,7 @@ mod tests {
 
     /// The coloured tokens with their classes.
     fn tokens(language: &str, code: &str) -> Vec<String> {
-        let html = listing(language, code);
+        let html = render_listing(language, code);
         let spans = html.split("<span class=\"").skip(1).map(|span| {
             let (class, rest) = span.split_once("\">").unwrap();
             let (token, _) = rest.split_once("</span>").unwrap();
@@ -302,7 +302,7 @@ mod tests {
         for language in [
             "sh", "toml", "json", "python", "rust", "yaml", "console", "",
         ] {
-            let html = listing(language, code);
+            let html = render_listing(language, code);
             let text: String = html
                 .split('<')
                 .map(|part| part.split_once('>').map_or(part, |(_, text)| text))
@@ -314,7 +314,7 @@ mod tests {
     #[test]
     fn prompts_are_apart_from_their_commands() {
         assert_eq!(
-            listing("console", "$ faceoff whoami # me\nAda & co\n$ ls\n"),
+            render_listing("console", "$ faceoff whoami # me\nAda & co\n$ ls\n"),
             "<span class=\"prompt\">$ </span><span class=\"command\">faceoff whoami \
              <span class=\"code-comment\"># me</span></span>\nAda &#38; co\n\
              <span class=\"prompt\">$ </span><span class=\"command\">ls</span>\n"

@@ -3,7 +3,7 @@
 
 use super::{
     escape::escape,
-    listing::listing,
+    listing::render_listing,
     sections::{Section, Sections},
 };
 use pulldown_cmark::{
@@ -304,7 +304,7 @@ impl<'a, S: LinkResolver> Writer<'a, S> {
         let code = text_of(&inner);
         self.sections.push_text(&code);
         self.sections.push_space();
-        let code = listing(language, &code);
+        let code = render_listing(language, &code);
         self.html(format!(
             "<div class=\"listing\"><pre tabindex=\"0\" role=\"group\" aria-label=\"{label}\"><code>{code}</code></pre></div>\n"
         ));

@@ -22,9 +22,9 @@ const MAX_COUNTED_OCCURRENCES: u32 = 5;
 
 /// Result of a search.
 #[derive(Debug, Default, PartialEq, Eq)]
-pub(super) struct Found {
+pub(super) struct SearchResults {
     /// Results of each kind that has some, documents first.
-    pub(super) kinds: Vec<FoundKind>,
+    pub(super) kinds: Vec<ResultGroup>,
     /// Number of results, including those that are not shown.
     pub(super) count: usize,
     pub(super) shown: usize,
@@ -33,7 +33,7 @@ pub(super) struct Found {
 }
 
 #[derive(Debug, PartialEq, Eq)]
-pub(super) struct FoundKind {
+pub(super) struct ResultGroup {
     pub(super) name: &'static str,
     pub(super) count: usize,
     pub(super) results: Vec<SearchResult>,
@@ -93,7 +93,7 @@ impl Index {
 
     /// Sections are ranked by matches in the title of a page, then in the heading or summary, then in the text, then by synonyms,
     /// then by the order of the pages.
-    pub(super) fn search(&self, query: &str) -> Found {
+    pub(super) fn search(&self, query: &str) -> SearchResults {
         let query = query.to_lowercase();
         let all: Vec<&str> = words(&query).map(|word| &query[word]).collect();
         let subject = all.iter().copied().filter(|word| !is_stop_word(word));
@@ -107,15 +107,15 @@ impl Index {
         let mut terms = HashSet::new();
         let mut replaced = Vec::new();
         for word in subject {
-            let matching = self.vocabulary.find(word);
-            if matching.terms.is_empty() {
-                return Found::default();
+            let query_terms = self.vocabulary.find(word);
+            if query_terms.terms.is_empty() {
+                return SearchResults::default();
             }
-            if let Some(other) = matching.correction {
+            if let Some(other) = query_terms.correction {
                 replaced.push((word, other));
             }
-            let found = self.sections_with(&matching.terms);
-            terms.extend(matching.terms.iter().map(|term| term.stem));
+            let found = self.sections_with(&query_terms.terms);
+            terms.extend(query_terms.terms.iter().map(|term| term.stem));
             hits = Some(match hits {
                 None => found,
                 Some(hits) => {
@@ -131,8 +131,8 @@ impl Index {
             .collect();
         hits.sort_by_key(|(hit, _)| Reverse(hit.score));
         let kinds = SectionKind::ALL.map(|kind| self.results_of(kind, &hits, &terms));
-        let kinds: Vec<FoundKind> = kinds.into_iter().flatten().collect();
-        Found {
+        let kinds: Vec<ResultGroup> = kinds.into_iter().flatten().collect();
+        SearchResults {
             count: hits.len(),
             shown: kinds.iter().map(|kind| kind.results.len()).sum(),
             kinds,
@@ -183,7 +183,7 @@ impl Index {
         kind: SectionKind,
         hits: &[(Hit, &Section)],
         terms: &HashSet<usize>,
-    ) -> Option<FoundKind> {
+    ) -> Option<ResultGroup> {
         let hits: Vec<_> = hits
             .iter()
             .filter(|(_, section)| section.kind == kind)
@@ -202,7 +202,7 @@ impl Index {
                 first => snippet(&section.text, first.unwrap_or(0), is_match),
             },
         });
-        (!hits.is_empty()).then(|| FoundKind {
+        (!hits.is_empty()).then(|| ResultGroup {
             name: kind.name(),
             count: hits.len(),
             results: results.collect(),

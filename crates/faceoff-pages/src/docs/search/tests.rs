@@ -34,7 +34,7 @@ fn marked(pieces: &[Piece]) -> String {
     pieces.collect()
 }
 
-fn results(found: &Found) -> Vec<&SearchResult> {
+fn results(found: &SearchResults) -> Vec<&SearchResult> {
     found.kinds.iter().flat_map(|kind| &kind.results).collect()
 }
 
@@ -137,8 +137,8 @@ fn slip_is_corrected_only_in_an_unknown_long_word() {
     // A word that exists is searched as it is; short words have too many neighbours.
     assert_eq!(headings(&index, "mullet"), ["Mullet"]);
     assert_eq!(index.search("mullet").correction, None);
-    assert_eq!(index.search("fosh"), Found::default());
-    assert_eq!(index.search("quidditch"), Found::default());
+    assert_eq!(index.search("fosh"), SearchResults::default());
+    assert_eq!(index.search("quidditch"), SearchResults::default());
 }
 
 #[test]

@@ -36,7 +36,7 @@ pub(super) struct Term {
 
 /// The terms for a word of the query; none if the documentation has nothing like it.
 #[derive(Debug, Default)]
-pub(super) struct Matching {
+pub(super) struct QueryTerms {
     pub(super) terms: Vec<Term>,
     /// The word of the documentation that replaces an unknown one.
     pub(super) correction: Option<String>,
@@ -142,23 +142,23 @@ impl Vocabulary {
 
     /// The terms for a word in lower case: its forms and synonyms; else words that begin with it; else those for a word that
     /// differs by a slip.
-    pub(super) fn find(&self, word: &str) -> Matching {
+    pub(super) fn find(&self, word: &str) -> QueryTerms {
         let terms = self.forms_and_synonyms(word);
         if !terms.is_empty() {
-            return Matching {
+            return QueryTerms {
                 terms,
                 correction: None,
             };
         }
         let terms = self.words_beginning_with(word);
         if !terms.is_empty() {
-            return Matching {
+            return QueryTerms {
                 terms,
                 correction: None,
             };
         }
         let correction = self.correct(word);
-        Matching {
+        QueryTerms {
             terms: correction.map_or_else(Vec::new, |word| self.forms_and_synonyms(word)),
             correction: correction.map(str::to_owned),
         }
