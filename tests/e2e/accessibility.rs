@@ -56,7 +56,12 @@ fn public_pages_follow_accessibility_rules() {
         "/problems",
         "/docs",
         "/docs/rules",
+        "/docs/start",
+        "/docs/configuration",
+        "/docs/search?q=tournamant",
         "/docs/api-reference",
+        "/docs/api-reference/public",
+        "/docs/api-reference/schemas",
         "/sign-in",
         "/register",
     ] {

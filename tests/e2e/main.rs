@@ -18,6 +18,7 @@ mod crash_recovery;
 mod cutoff;
 mod dashboards;
 mod demo;
+mod documentation;
 mod full_disk;
 mod game_replay;
 mod installation;

@@ -48,6 +48,16 @@ pub(super) static DASHBOARD_SCRIPT: Asset = Asset::new(
     JAVASCRIPT,
     compressed_text!("web/static/dashboard.js"),
 );
+pub(super) static DOCS_STYLE: Asset = Asset::new(
+    "/static/docs.css",
+    CSS,
+    compressed_text!("web/static/docs.css"),
+);
+pub(super) static DOCS_SCRIPT: Asset = Asset::new(
+    "/static/docs.js",
+    JAVASCRIPT,
+    compressed_text!("web/static/docs.js"),
+);
 pub(super) static EPISODES_STYLE: Asset = Asset::new(
     "/static/episodes.css",
     CSS,
@@ -71,12 +81,14 @@ pub(super) static REPLAY_SCRIPT: Asset = Asset::new(
     compressed_text!("web/client/dist/replay.js"),
 );
 
-static ALL: [&Asset; 9] = [
+static ALL: [&Asset; 11] = [
     &STYLE,
     &SCRIPT,
     &ICON,
     &DASHBOARD_STYLE,
     &DASHBOARD_SCRIPT,
+    &DOCS_STYLE,
+    &DOCS_SCRIPT,
     &EPISODES_STYLE,
     &REPLAY_STYLE,
     &FRONT_STYLE,

@@ -1,14 +1,22 @@
 //! `/docs`: the documentation of the project, the API reference and a search in both. The content is fixed while the server
 //! runs.
 
+mod escape;
 mod images;
 mod library;
+mod listing;
 mod markdown;
+mod outline;
 mod reference;
 mod search;
 mod sections;
+mod synonyms;
+mod words;
 
-use super::frame::{Frame, PageProblem};
+use super::{
+    assets,
+    frame::{Frame, PageProblem},
+};
 use askama::Template;
 use axum::{
     Extension, Router,
@@ -23,9 +31,10 @@ use faceoff_service::{
     problem::{Problem, ProblemKind},
     request_preconditions::{ETag, RequestPreconditions},
 };
-use library::{Group, LIBRARY, Page};
+use library::{LIBRARY, Page};
+use outline::{OutlineGroup, SideList, outline};
 use reference::{Reference, Schema, TokenRequirement, TypePart};
-use search::{Index, MAX_RESULTS, SearchResult};
+use search::{Index, SearchResults};
 use serde::Deserialize;
 use serde_json::Value;
 use std::sync::{Arc, OnceLock};
@@ -43,11 +52,16 @@ const NEWCOMERS: [(&str, &str); 4] = [
     ("protocol", "Messages between agent and evaluator"),
 ];
 
+/// Id and title of headings of the API reference; its other headings are pages.
+const REFERENCE_HEADINGS: [(&str, &str); 2] =
+    [("tokens", "Tokens"), ("responses", "Shared responses")];
+
 /// Content of the documentation, built on first use.
 #[derive(Debug)]
 struct Documentation {
     api: Arc<Value>,
     reference: OnceLock<Reference>,
+    outline: OnceLock<Vec<OutlineGroup>>,
     index: OnceLock<Index>,
     /// Held during a search.
     search_turn: Arc<Mutex<()>>,
@@ -56,6 +70,18 @@ struct Documentation {
 impl Documentation {
     fn reference(&self) -> &Reference {
         self.reference.get_or_init(|| Reference::new(&self.api))
+    }
+
+    fn outline(&self) -> &[OutlineGroup] {
+        self.outline.get_or_init(|| outline(self.reference()))
+    }
+
+    /// Head of the page with this path. `headings`: id and title of each of its headings.
+    fn head<'a>(&'a self, path: String, headings: Vec<(&'a str, String)>) -> DocsHead<'a> {
+        DocsHead {
+            side: Some(SideList::new(self.outline(), path, headings)),
+            ..DocsHead::new()
+        }
     }
 
     fn index(&self) -> &Index {
@@ -72,6 +98,7 @@ pub(super) fn router(api: Arc<Value>) -> Router<App> {
     let documentation = Arc::new(Documentation {
         api,
         reference: OnceLock::new(),
+        outline: OnceLock::new(),
         index: OnceLock::new(),
         search_turn: Arc::default(),
     });
@@ -87,18 +114,39 @@ pub(super) fn router(api: Arc<Value>) -> Router<App> {
         .layer(Extension(documentation))
 }
 
+/// What every page of the documentation has.
+struct DocsHead<'a> {
+    style: &'static str,
+    script: &'static str,
+    /// Text in the search field; empty except on the page of the results.
+    search_query: String,
+    /// List of all pages; the contents page is such a list.
+    side: Option<SideList<'a>>,
+}
+
+impl DocsHead<'_> {
+    fn new() -> Self {
+        Self {
+            style: assets::DOCS_STYLE.url(),
+            script: assets::DOCS_SCRIPT.url(),
+            search_query: String::new(),
+            side: None,
+        }
+    }
+}
+
 #[derive(Template)]
 #[template(path = "docs/contents.html")]
-struct ContentsPage {
+struct ContentsPage<'a> {
     frame: Frame,
-    /// Text in the search field, which every page of the documentation has; empty except on the page of the results.
-    search_query: String,
+    docs: DocsHead<'a>,
     newcomers: Vec<(&'static Page, &'static str)>,
-    groups: &'static [Group],
+    groups: &'a [OutlineGroup],
 }
 
 async fn contents(
     State(app): State<App>,
+    Extension(documentation): Extension<Arc<Documentation>>,
     conditions: RequestPreconditions,
 ) -> Result<Response, PageProblem> {
     let newcomers = NEWCOMERS.iter();
@@ -106,25 +154,28 @@ async fn contents(
         &conditions,
         &ContentsPage {
             frame: frame(&app),
-            search_query: String::new(),
+            docs: DocsHead::new(),
             newcomers: newcomers
                 .filter_map(|(name, topic)| Some((library::page(name)?, *topic)))
                 .collect(),
-            groups: &LIBRARY,
+            groups: documentation.outline(),
         },
     )
 }
 
 #[derive(Template)]
 #[template(path = "docs/document.html")]
-struct DocumentPage {
+struct DocumentPage<'a> {
     frame: Frame,
-    search_query: String,
+    docs: DocsHead<'a>,
     page: &'static Page,
+    previous: Option<&'static Page>,
+    next: Option<&'static Page>,
 }
 
 async fn document(
     State(app): State<App>,
+    Extension(documentation): Extension<Arc<Documentation>>,
     PathParam(name): PathParam<String>,
     conditions: RequestPreconditions,
 ) -> Result<Response, PageProblem> {
@@ -133,12 +184,17 @@ async fn document(
             "the documentation has no page {name}; all of them are listed at /docs"
         )));
     };
+    let headings = page.contents.iter();
+    let headings = headings.map(|entry| (&*entry.id, entry.title.clone()));
+    let (previous, next) = library::neighbours(page);
     respond(
         &conditions,
         &DocumentPage {
             frame: frame(&app),
-            search_query: String::new(),
+            docs: documentation.head(page.path(), headings.collect()),
             page,
+            previous,
+            next,
         },
     )
 }
@@ -147,7 +203,7 @@ async fn document(
 #[template(path = "docs/reference.html")]
 struct ReferencePage<'a> {
     frame: Frame,
-    search_query: String,
+    docs: DocsHead<'a>,
     reference: &'a Reference,
 }
 
@@ -156,11 +212,12 @@ async fn api_reference(
     Extension(documentation): Extension<Arc<Documentation>>,
     conditions: RequestPreconditions,
 ) -> Result<Response, PageProblem> {
+    let headings = REFERENCE_HEADINGS.map(|(id, title)| (id, title.to_owned()));
     respond(
         &conditions,
         &ReferencePage {
             frame: frame(&app),
-            search_query: String::new(),
+            docs: documentation.head(reference::PATH.into(), headings.into()),
             reference: documentation.reference(),
         },
     )
@@ -170,7 +227,7 @@ async fn api_reference(
 #[template(path = "docs/operations.html")]
 struct OperationsPage<'a> {
     frame: Frame,
-    search_query: String,
+    docs: DocsHead<'a>,
     group: &'a reference::Group,
 }
 
@@ -187,11 +244,17 @@ async fn operations(
             reference::PATH
         )));
     };
+    let headings = group.operations.iter();
+    // Without the base, which all paths have.
+    let headings = headings.map(|operation| {
+        let title = operation.title.replacen(" /api/v1/", " /", 1);
+        (&*operation.id, title)
+    });
     respond(
         &conditions,
         &OperationsPage {
             frame: frame(&app),
-            search_query: String::new(),
+            docs: documentation.head(group.path(), headings.collect()),
             group,
         },
     )
@@ -201,7 +264,7 @@ async fn operations(
 #[template(path = "docs/schemas.html")]
 struct SchemasPage<'a> {
     frame: Frame,
-    search_query: String,
+    docs: DocsHead<'a>,
     schemas: &'a [Schema],
 }
 
@@ -214,7 +277,7 @@ async fn schemas(
         &conditions,
         &SchemasPage {
             frame: frame(&app),
-            search_query: String::new(),
+            docs: documentation.head(reference::SCHEMAS_PATH.into(), Vec::new()),
             schemas: &documentation.reference().schemas,
         },
     )
@@ -224,7 +287,7 @@ async fn schemas(
 #[template(path = "docs/schema.html")]
 struct SchemaPage<'a> {
     frame: Frame,
-    search_query: String,
+    docs: DocsHead<'a>,
     schema: &'a Schema,
 }
 
@@ -245,7 +308,7 @@ async fn schema(
         &conditions,
         &SchemaPage {
             frame: frame(&app),
-            search_query: String::new(),
+            docs: documentation.head(schema.path(), Vec::new()),
             schema,
         },
     )
@@ -259,12 +322,10 @@ struct SearchQuery {
 
 #[derive(Template)]
 #[template(path = "docs/search.html")]
-struct SearchPage {
+struct SearchPage<'a> {
     frame: Frame,
-    search_query: String,
-    results: Vec<SearchResult>,
-    /// Number of results, including those that are not shown.
-    count: usize,
+    docs: DocsHead<'a>,
+    found: SearchResults,
 }
 
 async fn search_page(
@@ -280,7 +341,7 @@ async fn search_page(
         return Err(Problem::new(ProblemKind::InvalidRequest, detail).into());
     }
     let search_query = search_query.trim().to_owned();
-    // A search takes milliseconds of CPU time. Only one runs at a time, off the threads that handle requests, so that searching
+    // The first search builds the index, which takes CPU time. Only one search runs at a time, off the threads that handle requests, so that searching
     // visitors wait for each other and not everybody for them.
     let turn = Arc::clone(&documentation.search_turn).lock_owned().await;
     let searched = Arc::clone(&documentation);
@@ -290,14 +351,16 @@ async fn search_page(
         let _turn = turn;
         searched.index().search(&query)
     });
-    let (results, count) = search.await.map_err(Problem::internal)?;
+    let found = search.await.map_err(Problem::internal)?;
     respond(
         &conditions,
         &SearchPage {
             frame: frame(&app),
-            search_query,
-            results,
-            count,
+            docs: DocsHead {
+                search_query,
+                ..documentation.head("/docs/search".into(), Vec::new())
+            },
+            found,
         },
     )
 }

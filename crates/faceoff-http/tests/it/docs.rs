@@ -68,7 +68,7 @@ async fn documentation_has_no_broken_links() {
         assert_eq!(select_all(&page, "h1").len(), 1, "{path}");
         // Elements that the content security policy blocks, or that load content of other sites.
         for forbidden in [
-            "script:not([src^='/static/live.js?'])",
+            "script:not([src^='/static/live.js?']):not([src^='/static/docs.js?'])",
             "style",
             "[style]",
             "[onclick]",
@@ -178,6 +178,76 @@ async fn api_reference_lists_all_operations_and_schemas() {
 }
 
 #[tokio::test]
+async fn side_list_has_all_pages_and_marks_the_current() {
+    let site = Site::start().await;
+    let contents = fetch_page(&site, "/docs").await;
+    assert_eq!(select_all(&contents, ".side").len(), 0);
+    let all = attributes(&contents, "main .card dl a", "href");
+    for (path, current, state, headings) in [
+        ("/docs/rules", "/docs/rules", "page", ".prose h2"),
+        (
+            "/docs/api-reference",
+            "/docs/api-reference",
+            "page",
+            "#tokens, #responses",
+        ),
+        (
+            "/docs/api-reference/public",
+            "/docs/api-reference/public",
+            "page",
+            ".operation h2",
+        ),
+        (
+            "/docs/api-reference/schemas/BoardView",
+            "/docs/api-reference/schemas",
+            "true",
+            "#none",
+        ),
+    ] {
+        let page = fetch_page(&site, path).await;
+        let listed = attributes(&page, ".side-list > ul > li > a", "href");
+        assert_eq!(listed, all, "{path}");
+        let marked = ".side a[aria-current]";
+        assert_eq!(attributes(&page, marked, "href"), [current], "{path}");
+        let states = attributes(&page, marked, "aria-current");
+        assert_eq!(states, [state], "{path}");
+        let below = ".side a[aria-current] + ul[aria-label='On this page'] a";
+        let ids = attributes(&page, headings, "id").into_iter();
+        let anchors: Vec<String> = ids.map(|id| format!("#{id}")).collect();
+        assert_eq!(attributes(&page, below, "href"), anchors, "{path}");
+        assert_eq!(anchors.is_empty(), headings == "#none", "{path}");
+    }
+    // Each group of the list has a name.
+    let names = attributes(
+        &fetch_page(&site, "/docs/rules").await,
+        ".side-list > p",
+        "id",
+    );
+    assert_eq!(names.len(), 5);
+}
+
+#[tokio::test]
+async fn documents_link_to_their_neighbours() {
+    let site = Site::start().await;
+    let contents = fetch_page(&site, "/docs").await;
+    let documents = attributes(&contents, "main .card dl a", "href");
+    let is_document = |path: &&String| !path.starts_with("/docs/api-reference");
+    let documents: Vec<&String> = documents.iter().filter(is_document).collect();
+    // Read in the order of the links, the documents are all there.
+    let mut read = Vec::new();
+    let mut next = vec!["/docs/start".to_owned()];
+    while let Some(path) = next.pop() {
+        let page = fetch_page(&site, &path).await;
+        let previous = attributes(&page, ".neighbours a[rel=prev]", "href");
+        assert_eq!(previous, Vec::from_iter(read.last().cloned()), "{path}");
+        next = attributes(&page, ".neighbours a[rel=next]", "href");
+        read.push(path);
+        assert!(read.len() <= documents.len(), "{read:?}");
+    }
+    assert_eq!(read.iter().collect::<Vec<_>>(), documents);
+}
+
+#[tokio::test]
 async fn search_finds_sections_and_marks_words() {
     let site = Site::start().await;
     let page = search(&site, "Frozen BOARDS").await;
@@ -193,16 +263,91 @@ async fn search_finds_sections_and_marks_words() {
     let page = search(&site, "BoardView").await;
     let links = attributes(&page, ".search-results li a", "href");
     assert_eq!(links[0], "/docs/api-reference/schemas/BoardView");
+    // The kinds of results are apart: first prose, then operations, then types.
+    let page = search(&site, "board").await;
+    let kinds = select_all(&page, "main h2").into_iter().map(text_of);
+    let kinds: Vec<String> = kinds
+        .map(|kind| {
+            kind.trim_end_matches(|c: char| c == ' ' || c.is_ascii_digit())
+                .into()
+        })
+        .collect();
+    assert_eq!(kinds, ["Documents", "API operations", "API schemas"]);
+    let lead = text_of(select_all(&page, ".lead")[0]);
+    assert!(lead.contains("Add words to narrow the search."), "{lead}");
 
     let page = search(&site, "quidditch").await;
     let message = text_of(select_all(&page, "main")[0]);
-    assert!(
-        message.contains("No section contains all words of “quidditch”"),
-        "{message}"
-    );
+    for text in [
+        "No section contains all words of “quidditch”",
+        "Try fewer words",
+    ] {
+        assert!(message.contains(text), "{message}");
+    }
     let page = search(&site, "").await;
     let message = text_of(select_all(&page, "main")[0]);
     assert!(message.contains("Enter one or more words"), "{message}");
+}
+
+#[tokio::test]
+async fn search_knows_questions_forms_slips_and_synonyms() {
+    let site = Site::start().await;
+    for (query, expected) in [
+        ("how do I submit", "/docs/start"),
+        ("submitted", "/docs/start"),
+        ("What GPU do agents get?", "/docs/sandbox"),
+        ("hardware", "/docs/sandbox"),
+        ("leaderboard", "/docs/rules#score-and-boards"),
+        ("disqualify", "/docs/rules#teams-that-leave"),
+        ("ban", "/docs/workers#trust"),
+        ("quotas", "/docs/api#for-a-team"),
+        ("tournamant", "/docs/tournament"),
+        ("Stable Baselines", "/docs/from-sb3"),
+    ] {
+        let page = search(&site, query).await;
+        let links = attributes(&page, ".search-results li a", "href");
+        let best = &links[..links.len().min(8)];
+        assert!(
+            best.iter().any(|link| link == expected),
+            "{query}: {best:?}"
+        );
+    }
+    let page = search(&site, "the tournamant").await;
+    let lead = text_of(select_all(&page, ".lead")[0]);
+    for text in [
+        "Showing results for “the tournament”.",
+        "Nothing contains “tournamant”.",
+    ] {
+        assert!(lead.contains(text), "{lead}");
+    }
+    let page = search(&site, "tournament").await;
+    let lead = text_of(select_all(&page, ".lead")[0]);
+    assert!(!lead.contains("Showing results for"), "{lead}");
+}
+
+#[tokio::test]
+async fn listings_are_coloured_and_prompts_are_apart() {
+    let site = Site::start().await;
+    let page = fetch_page(&site, "/docs/start").await;
+    let listings = select_all(&page, ".prose pre");
+    assert_eq!(select_all(&page, ".listing > pre").len(), listings.len());
+    let commands: Vec<String> = select_all(&page, "pre .command")
+        .into_iter()
+        .map(text_of)
+        .collect();
+    assert!(
+        commands.iter().any(|command| command == "faceoff submit ."),
+        "{commands:?}"
+    );
+    let prompts = select_all(&page, "pre .prompt");
+    assert_eq!(prompts.len(), commands.len());
+    assert!(!commands.iter().any(|command| command.starts_with('$')));
+    let page = fetch_page(&site, "/docs/configuration").await;
+    let keys: Vec<String> = select_all(&page, "pre .code-key")
+        .into_iter()
+        .map(text_of)
+        .collect();
+    assert!(keys.iter().any(|key| key == "listen"), "{keys:?}");
 }
 
 #[tokio::test]

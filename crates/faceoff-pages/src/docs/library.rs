@@ -62,7 +62,7 @@ static SOURCES: LazyLock<[(&str, Vec<Source>); 4]> = LazyLock::new(|| {
             vec![
                 source!(
                     "start",
-                    "Your first agent on the board within an hour, and next steps."
+                    "Your first agent on the board within an hour: evaluate, submit, and next steps."
                 ),
                 source!(
                     "rules",
@@ -94,7 +94,7 @@ static SOURCES: LazyLock<[(&str, Vec<Source>); 4]> = LazyLock::new(|| {
                 ),
                 source!(
                     "sandbox",
-                    "Runtimes, packages, memory and time of agents on the server."
+                    "Runtimes, packages and hardware of agents on the server: CPU, memory, time, and no GPU."
                 ),
                 source!(
                     "tournament",
@@ -203,6 +203,7 @@ fn render(source: &'static Source) -> Page {
         source.markdown.text(),
         &path(source.name),
         title,
+        source.summary,
         &LibraryLinks,
     );
     Page {
@@ -218,6 +219,17 @@ fn render(source: &'static Source) -> Page {
 pub(super) fn page(name: &str) -> Option<&'static Page> {
     let mut pages = LIBRARY.iter().flat_map(|group| &group.pages);
     pages.find(|page| page.name == name)
+}
+
+/// The documents before and after a page.
+pub(super) fn neighbours(page: &Page) -> (Option<&'static Page>, Option<&'static Page>) {
+    let pages: Vec<&Page> = LIBRARY.iter().flat_map(|group| &group.pages).collect();
+    let position = pages.iter().position(|other| other.name == page.name);
+    let at = |index: Option<usize>| pages.get(index?).copied();
+    (
+        at(position.and_then(|position| position.checked_sub(1))),
+        at(position.map(|position| position + 1)),
+    )
 }
 
 /// Links between documents of the library.

@@ -1,8 +1,11 @@
 //! Markdown of the documents as HTML of this site: headings with anchors, scrollable tables and listings, and links to pages of
 //! this site. HTML in Markdown is shown as text. Styles are classes, never attributes: the content security policy demands it.
 
-use super::sections::{Section, Sections};
-use askama::filters::{Escaper, Html};
+use super::{
+    escape::escape,
+    listing::render_listing,
+    sections::{Section, Sections},
+};
 use pulldown_cmark::{
     Alignment, CodeBlockKind, CowStr, Event, HeadingLevel, Options, Parser, Tag, TagEnd, html,
 };
@@ -31,11 +34,12 @@ pub(super) trait LinkResolver {
     fn picture(&self, file: &str) -> Option<String>;
 }
 
-/// Renders a whole document. `path`: path of its page.
+/// Renders a whole document. `path` and `summary`: path of its page, and its content in one line.
 pub(super) fn render_document(
     markdown: &str,
     path: &str,
     title: &str,
+    summary: &str,
     links: &impl LinkResolver,
 ) -> Document {
     let options = Options::ENABLE_TABLES | Options::ENABLE_FOOTNOTES;
@@ -44,7 +48,7 @@ pub(super) fn render_document(
         out: Vec::new(),
         ids: HashSet::new(),
         contents: Vec::new(),
-        sections: Sections::new(path, title),
+        sections: Sections::new(path, title, summary),
         heading: title.to_owned(),
         tables: 0,
         listings: 0,
@@ -111,13 +115,6 @@ pub(super) fn slug(heading: &str) -> String {
     anchor.flat_map(char::to_lowercase).collect()
 }
 
-pub(super) fn escape(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    Html.write_escaped_str(&mut out, text)
-        .expect("writing to a String cannot fail");
-    out
-}
-
 struct Writer<'a, S> {
     links: &'a S,
     out: Vec<Event<'a>>,
@@ -149,11 +146,7 @@ impl<'a, S: LinkResolver> Writer<'a, S> {
                 let end = self.link_ends.pop().unwrap_or_default();
                 self.html(end);
             }
-            Event::Start(Tag::CodeBlock(kind)) => self.listing(&kind),
-            Event::End(TagEnd::CodeBlock) => {
-                self.sections.push_space();
-                self.html("</code></pre>\n");
-            }
+            Event::Start(Tag::CodeBlock(kind)) => self.listing(&kind, rest),
             Event::Start(Tag::Table(columns)) => self.table(columns),
             Event::End(TagEnd::Table) => self.html("</tbody></table></div>\n"),
             Event::Start(Tag::TableHead) => {
@@ -295,17 +288,25 @@ impl<'a, S: LinkResolver> Writer<'a, S> {
         }
     }
 
-    fn listing(&mut self, kind: &CodeBlockKind<'_>) {
+    fn listing(&mut self, kind: &CodeBlockKind<'_>, rest: &mut Parser<'a>) {
         self.listings += 1;
-        let label = match kind {
-            CodeBlockKind::Fenced(language) if matches!(&**language, "sh" | "console") => {
-                "Commands"
-            }
-            CodeBlockKind::Fenced(_) | CodeBlockKind::Indented => "Listing",
+        let language = match kind {
+            CodeBlockKind::Fenced(language) => &**language,
+            CodeBlockKind::Indented => "",
+        };
+        let label = if matches!(language, "sh" | "console") {
+            "Commands"
+        } else {
+            "Listing"
         };
         let label = escape(&format!("{label} {}: {}", self.listings, self.heading));
+        let inner = take_until(&Event::End(TagEnd::CodeBlock), rest);
+        let code = text_of(&inner);
+        self.sections.push_text(&code);
+        self.sections.push_space();
+        let code = render_listing(language, &code);
         self.html(format!(
-            "<pre tabindex=\"0\" role=\"group\" aria-label=\"{label}\"><code>"
+            "<div class=\"listing\"><pre tabindex=\"0\" role=\"group\" aria-label=\"{label}\"><code>{code}</code></pre></div>\n"
         ));
     }
 
@@ -345,14 +346,18 @@ fn without_html(event: Event<'_>) -> Event<'_> {
     }
 }
 
-/// The text of events.
+/// The text of events, without spaces around it.
 fn plain_text(events: &[Event<'_>]) -> String {
+    text_of(events).trim().to_owned()
+}
+
+fn text_of(events: &[Event<'_>]) -> String {
     let texts = events.iter().map(|event| match event {
         Event::Text(text) | Event::Code(text) => text,
         Event::SoftBreak | Event::HardBreak | Event::End(TagEnd::Paragraph) => " ",
         _ => "",
     });
-    texts.collect::<String>().trim().to_owned()
+    texts.collect()
 }
 
 #[cfg(test)]

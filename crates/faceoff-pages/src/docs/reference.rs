@@ -4,14 +4,14 @@ mod type_description;
 
 use super::{
     markdown::{self, Prose},
-    sections::Section,
+    sections::{Section, SectionKind},
 };
 use serde_json::{Map, Value};
 pub(super) use type_description::{Field, TypePart};
 use type_description::{describe_type, description, fields};
 
 pub(super) const PATH: &str = "/docs/api-reference";
-const SCHEMAS_PATH: &str = "/docs/api-reference/schemas";
+pub(super) const SCHEMAS_PATH: &str = "/docs/api-reference/schemas";
 
 #[derive(Debug)]
 pub(super) struct Reference {
@@ -35,6 +35,8 @@ pub(super) struct Group {
 #[derive(Debug)]
 pub(super) struct Operation {
     pub(super) id: String,
+    /// Method and path.
+    pub(super) title: String,
     pub(super) method: String,
     pub(super) path: String,
     pub(super) summary: Prose,
@@ -108,13 +110,6 @@ impl Group {
     }
 }
 
-impl Operation {
-    /// Method and path, without the common base.
-    pub(super) fn title(&self) -> String {
-        format!("{} {}", self.method, self.path)
-    }
-}
-
 impl Schema {
     pub(super) fn path(&self) -> String {
         schema_path(&self.name)
@@ -159,13 +154,17 @@ impl Reference {
     pub(super) fn sections(&self) -> Vec<Section> {
         let operations = self.groups.iter().flat_map(|group| {
             group.operations.iter().map(|operation| Section {
+                kind: SectionKind::Operation,
+                summary: String::new(),
                 page: format!("API reference: {}", group.name),
-                heading: operation.title(),
+                heading: operation.title.clone(),
                 href: format!("{}#{}", group.path(), operation.id),
                 text: operation.search_text(),
             })
         });
         let schemas = self.schemas.iter().map(|schema| Section {
+            kind: SectionKind::Schema,
+            summary: String::new(),
             page: "API reference: schemas".into(),
             heading: schema.name.clone(),
             href: schema.path(),
@@ -212,6 +211,7 @@ impl Operation {
             .map(|(status, response)| ResponseDoc::new(status, response));
         Self {
             id: text(&operation["operationId"]),
+            title: format!("{} {path}", method.to_uppercase()),
             method: method.to_uppercase(),
             path: path.to_owned(),
             summary: markdown::render_prose(&text(&operation["summary"])),

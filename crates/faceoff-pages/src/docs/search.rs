@@ -1,239 +1,256 @@
-//! Full-text search: sections that contain all words of a query, ranked.
+//! Full-text search: sections that contain all words of a query, or other forms or synonyms of them, ranked. The index is built
+//! once; a search reads only the entries of its words, and the texts of the results that are shown.
 
-use super::sections::Section;
-use memchr::memmem::Finder;
-use std::{cmp::Reverse, ops::Range};
+mod snippet;
+mod vocabulary;
 
-/// Largest number of results on the page.
-pub(super) const MAX_RESULTS: usize = 30;
-/// Length of a snippet on each side of the first match, in bytes.
-const SNIPPET_BYTES: usize = 110;
+use super::{
+    sections::{Section, SectionKind},
+    words::{is_stop_word, words},
+};
+use snippet::{Piece, pieces, snippet};
+use std::{
+    cmp::{Reverse, max},
+    collections::HashSet,
+};
+use vocabulary::{Term, Vocabulary};
+
+/// Largest number of results of a kind on the page.
+const MAX_RESULTS_OF_A_KIND: usize = 20;
+/// Occurrences of a word in a text beyond this do not improve the rank of a section.
+const MAX_COUNTED_OCCURRENCES: u32 = 5;
+
+/// Result of a search.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub(super) struct SearchResults {
+    /// Results of each kind that has some, documents first.
+    pub(super) kinds: Vec<ResultGroup>,
+    /// Number of results, including those that are not shown.
+    pub(super) count: usize,
+    pub(super) shown: usize,
+    /// For a query with slips: what the results are for.
+    pub(super) correction: Option<Correction>,
+}
+
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct ResultGroup {
+    pub(super) name: &'static str,
+    pub(super) count: usize,
+    pub(super) results: Vec<SearchResult>,
+}
+
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct Correction {
+    /// The query with words of the documentation.
+    pub(super) query: String,
+    /// Words of the query that the documentation does not have.
+    pub(super) unknown: Vec<String>,
+}
 
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct SearchResult {
-    pub(super) page: String,
+    /// Title of the page; `None` if it is the heading.
+    pub(super) page: Option<String>,
     pub(super) href: String,
     pub(super) heading: Vec<Piece>,
     pub(super) snippet: Vec<Piece>,
 }
 
-/// A piece of text; matches are highlighted.
-#[derive(Debug, PartialEq, Eq)]
-pub(super) struct Piece {
-    pub(super) text: String,
-    pub(super) is_match: bool,
+#[derive(Debug)]
+pub(super) struct Index {
+    sections: Vec<Section>,
+    vocabulary: Vocabulary,
 }
 
-#[derive(Debug)]
-pub(super) struct Index(Vec<IndexedSection>);
+/// How well a section matches. The order of the fields is the order of their importance.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+struct Score {
+    title: u32,
+    heading: u32,
+    text: u32,
+    synonyms: u32,
+}
 
-#[derive(Debug)]
-struct IndexedSection {
-    section: Section,
-    /// In ASCII lower case, so that byte positions are the same as in the original text. The documents are English.
-    heading: String,
-    text: String,
+/// A section that contains all words so far.
+#[derive(Debug, Clone, Copy)]
+struct Hit {
+    score: Score,
+    /// Position of the first match in the text.
+    first: Option<usize>,
+    /// Does the section itself have a match, not only the title of its page?
+    is_own: bool,
 }
 
 impl Index {
     pub(super) fn new(sections: impl IntoIterator<Item = Section>) -> Self {
-        let indexed = sections.into_iter().map(|section| IndexedSection {
-            heading: section.heading.to_ascii_lowercase(),
-            text: section.text.to_ascii_lowercase(),
-            section,
-        });
-        Self(indexed.collect())
-    }
-
-    /// The first [`MAX_RESULTS`] sections that contain all words, and the total number.
-    ///
-    /// Sections are ranked by the number of words in the heading, then by matches in the text, then by the order of the pages.
-    pub(super) fn search(&self, query: &str) -> (Vec<SearchResult>, usize) {
-        let query = query.to_ascii_lowercase();
-        let mut words: Vec<&str> = query.split_whitespace().collect();
-        words.sort_unstable();
-        words.dedup();
-        if words.is_empty() {
-            return (Vec::new(), 0);
+        let sections: Vec<Section> = sections.into_iter().collect();
+        let vocabulary = Vocabulary::new(&sections);
+        Self {
+            sections,
+            vocabulary,
         }
-        // Long words first: they are rare, and a section without one of the words needs no further search.
-        let mut finders: Vec<Finder> = words.iter().map(Finder::new).collect();
-        finders.sort_by_key(|finder| Reverse(finder.needle().len()));
-        let mut results: Vec<(Reverse<(usize, usize)>, &IndexedSection)> = self
-            .0
-            .iter()
-            .filter_map(|section| section.rank(&finders).map(|rank| (Reverse(rank), section)))
-            .collect();
-        results.sort_by_key(|(rank, _)| *rank);
-        let shown = results
-            .iter()
-            .take(MAX_RESULTS)
-            .map(|(_, section)| section.result(&words));
-        (shown.collect(), results.len())
     }
-}
 
-impl IndexedSection {
-    /// Number of words in the heading, and number of matches in the text; `None` if a word is missing.
-    fn rank(&self, words: &[Finder]) -> Option<(usize, usize)> {
-        let (mut words_in_heading, mut matches_in_text) = (0, 0);
-        for word in words {
-            let is_in_heading = word.find(self.heading.as_bytes()).is_some();
-            let count = word.find_iter(self.text.as_bytes()).count();
-            if !is_in_heading && count == 0 {
-                return None;
+    /// Sections are ranked by matches in the title of a page, then in the heading or summary, then in the text, then by synonyms,
+    /// then by the order of the pages.
+    pub(super) fn search(&self, query: &str) -> SearchResults {
+        let query = query.to_lowercase();
+        let all: Vec<&str> = words(&query).map(|word| &query[word]).collect();
+        let subject = all.iter().copied().filter(|word| !is_stop_word(word));
+        let mut subject: Vec<&str> = subject.collect();
+        if subject.is_empty() {
+            subject.clone_from(&all);
+        }
+        subject.sort_unstable();
+        subject.dedup();
+        let mut hits: Option<Vec<Option<Hit>>> = None;
+        let mut terms = HashSet::new();
+        let mut replaced = Vec::new();
+        for word in subject {
+            let query_terms = self.vocabulary.find(word);
+            if query_terms.terms.is_empty() {
+                return SearchResults::default();
             }
-            words_in_heading += usize::from(is_in_heading);
-            matches_in_text += count;
+            if let Some(other) = query_terms.correction {
+                replaced.push((word, other));
+            }
+            let found = self.sections_with(&query_terms.terms);
+            terms.extend(query_terms.terms.iter().map(|term| term.stem));
+            hits = Some(match hits {
+                None => found,
+                Some(hits) => {
+                    let both = hits.into_iter().zip(found);
+                    both.map(|(a, b)| Some(a?.and(b?))).collect()
+                }
+            });
         }
-        Some((words_in_heading, matches_in_text))
+        let hits = hits.unwrap_or_default().into_iter().zip(&self.sections);
+        let mut hits: Vec<(Hit, &Section)> = hits
+            .filter_map(|(hit, section)| Some((hit?, section)))
+            .filter(|(hit, _)| hit.is_own)
+            .collect();
+        hits.sort_by_key(|(hit, _)| Reverse(hit.score));
+        let kinds = SectionKind::ALL.map(|kind| self.results_of(kind, &hits, &terms));
+        let kinds: Vec<ResultGroup> = kinds.into_iter().flatten().collect();
+        SearchResults {
+            count: hits.len(),
+            shown: kinds.iter().map(|kind| kind.results.len()).sum(),
+            kinds,
+            correction: Correction::new(&all, &replaced),
+        }
     }
 
-    fn result(&self, words: &[&str]) -> SearchResult {
-        let text = &self.section.text;
-        let first = words.iter().filter_map(|word| self.text.find(word)).min();
-        let shown = snippet_range(text, first.unwrap_or(0));
-        let mut snippet = pieces(&text[shown.clone()], &self.text[shown.clone()], words);
-        let ellipsis = || Piece {
-            text: "…".into(),
-            is_match: false,
+    /// For each section, how it matches a word of the query, given as the terms that stand for it.
+    fn sections_with(&self, terms: &[Term]) -> Vec<Option<Hit>> {
+        let mut found: Vec<Option<Hit>> = vec![None; self.sections.len()];
+        for term in terms {
+            for posting in self.vocabulary.postings(term.stem) {
+                let section = &self.sections[posting.section];
+                let is_title = posting.in_title && section.is_start();
+                let occurrences = posting.in_text.min(MAX_COUNTED_OCCURRENCES);
+                let score = if term.is_synonym {
+                    let is_heading = is_title || posting.in_heading;
+                    Score {
+                        synonyms: if is_heading {
+                            MAX_COUNTED_OCCURRENCES
+                        } else {
+                            occurrences
+                        },
+                        ..Score::default()
+                    }
+                } else {
+                    Score {
+                        title: is_title.into(),
+                        heading: posting.in_heading.into(),
+                        text: occurrences,
+                        synonyms: 0,
+                    }
+                };
+                let hit = Hit {
+                    score,
+                    first: (posting.in_text > 0).then_some(posting.first),
+                    is_own: section.is_start() || posting.in_heading || posting.in_text > 0,
+                };
+                let known = &mut found[posting.section];
+                *known = Some(known.map_or(hit, |known| known.or(hit)));
+            }
+        }
+        found
+    }
+
+    fn results_of(
+        &self,
+        kind: SectionKind,
+        hits: &[(Hit, &Section)],
+        terms: &HashSet<usize>,
+    ) -> Option<ResultGroup> {
+        let hits: Vec<_> = hits
+            .iter()
+            .filter(|(_, section)| section.kind == kind)
+            .collect();
+        let is_match = |word: &str| {
+            let stem = self.vocabulary.stem_of(word);
+            stem.is_some_and(|stem| terms.contains(&stem))
         };
-        if shown.start > 0 {
-            snippet.insert(0, ellipsis());
+        let shown = hits.iter().take(MAX_RESULTS_OF_A_KIND);
+        let results = shown.map(|(hit, section)| SearchResult {
+            page: (!section.is_start()).then(|| section.page.clone()),
+            href: section.href.clone(),
+            heading: pieces(&section.heading, is_match),
+            snippet: match hit.first {
+                None if !section.summary.is_empty() => pieces(&section.summary, is_match),
+                first => snippet(&section.text, first.unwrap_or(0), is_match),
+            },
+        });
+        (!hits.is_empty()).then(|| ResultGroup {
+            name: kind.name(),
+            count: hits.len(),
+            results: results.collect(),
+        })
+    }
+}
+
+impl Hit {
+    /// Of a section that matches two words of the query.
+    fn and(self, other: Self) -> Self {
+        Self {
+            score: Score {
+                title: self.score.title + other.score.title,
+                heading: self.score.heading + other.score.heading,
+                text: self.score.text + other.score.text,
+                synonyms: self.score.synonyms + other.score.synonyms,
+            },
+            first: self.first.into_iter().chain(other.first).min(),
+            is_own: self.is_own || other.is_own,
         }
-        if shown.end < text.len() {
-            snippet.push(ellipsis());
-        }
-        SearchResult {
-            page: self.section.page.clone(),
-            href: self.section.href.clone(),
-            heading: pieces(&self.section.heading, &self.heading, words),
-            snippet,
+    }
+
+    /// Of a section that matches a word of the query by two terms.
+    fn or(self, other: Self) -> Self {
+        Self {
+            score: Score {
+                title: max(self.score.title, other.score.title),
+                heading: max(self.score.heading, other.score.heading),
+                text: max(self.score.text, other.score.text),
+                synonyms: max(self.score.synonyms, other.score.synonyms),
+            },
+            ..self.and(other)
         }
     }
 }
 
-/// A range of whole words around a byte position.
-fn snippet_range(text: &str, position: usize) -> Range<usize> {
-    let from = text.floor_char_boundary(position.saturating_sub(SNIPPET_BYTES));
-    let start = match text[from..position].find(' ') {
-        Some(space) if from > 0 => from + space + 1,
-        _ => from,
-    };
-    let to = text.ceil_char_boundary((position + SNIPPET_BYTES).min(text.len()));
-    let end = text[to..].find(' ').map_or(text.len(), |space| to + space);
-    // Limits the range even if a single word is very long.
-    start..end.min(text.ceil_char_boundary((to + SNIPPET_BYTES).min(text.len())))
-}
-
-/// Splits `text` at matches of the words; `lower` is the same text in lower case.
-fn pieces(text: &str, lower: &str, words: &[&str]) -> Vec<Piece> {
-    let mut pieces = Vec::new();
-    // Up to here the text is split.
-    let mut done = 0;
-    let mut push = |range: Range<usize>, is_match| {
-        if !range.is_empty() {
-            let text = text[range].to_owned();
-            pieces.push(Piece { text, is_match });
-        }
-    };
-    // The nearest match next; the longest word if several start there.
-    while let Some((start, Reverse(length))) = words
-        .iter()
-        .filter_map(|word| Some((done + lower[done..].find(word)?, Reverse(word.len()))))
-        .min()
-    {
-        push(done..start, false);
-        push(start..start + length, true);
-        done = start + length;
+impl Correction {
+    fn new(query: &[&str], replaced: &[(&str, String)]) -> Option<Self> {
+        let corrected = query.iter().map(|word| {
+            let other = replaced.iter().find(|(unknown, _)| unknown == word);
+            other.map_or(*word, |(_, other)| other.as_str())
+        });
+        (!replaced.is_empty()).then(|| Self {
+            query: corrected.collect::<Vec<_>>().join(" "),
+            unknown: replaced.iter().map(|(word, _)| (*word).into()).collect(),
+        })
     }
-    push(done..text.len(), false);
-    pieces
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn section(heading: &str, text: &str) -> Section {
-        Section {
-            page: "Page".into(),
-            heading: heading.into(),
-            href: format!("/docs/page#{heading}"),
-            text: text.into(),
-        }
-    }
-
-    fn headings(index: &Index, query: &str) -> Vec<String> {
-        let (results, count) = index.search(query);
-        assert_eq!(results.len(), count);
-        let headings = results.iter().map(|result| {
-            let texts = result.heading.iter().map(|piece| piece.text.as_str());
-            texts.collect()
-        });
-        headings.collect()
-    }
-
-    #[test]
-    fn ranking_prefers_headings_then_match_count() {
-        let index = Index::new([
-            section("Once", "the puck"),
-            section("Often", "puck, Puck and PUCK"),
-            section("The puck", "round"),
-            section("Other", "text"),
-        ]);
-        assert_eq!(headings(&index, "puck"), ["The puck", "Often", "Once"]);
-        assert_eq!(headings(&index, "PUCK the"), ["The puck", "Once"]);
-        assert_eq!(headings(&index, "puck mallet"), [""; 0]);
-        assert_eq!(headings(&index, "  "), [""; 0]);
-    }
-
-    #[test]
-    fn matches_keep_their_original_case() {
-        let index = Index::new([section("A Puck", "Pucks: ≤ 2 puckish µ")]);
-        let (results, _) = index.search("puck PUCKS");
-        let marked = |pieces: &[Piece]| {
-            let pieces = pieces.iter().map(|piece| match piece.is_match {
-                true => format!("[{}]", piece.text),
-                false => piece.text.clone(),
-            });
-            pieces.collect::<String>()
-        };
-        assert_eq!(marked(&results[0].snippet), "[Pucks]: ≤ 2 [puck]ish µ");
-        let (results, _) = index.search("puck µ");
-        assert_eq!(marked(&results[0].heading), "A [Puck]");
-        assert_eq!(marked(&results[0].snippet), "[Puck]s: ≤ 2 [puck]ish [µ]");
-    }
-
-    #[test]
-    fn snippet_surrounds_first_match_on_char_boundaries() {
-        let filler = "äöü … ".repeat(200);
-        let index = Index::new([section("Long", &format!("{filler}here {filler}"))]);
-        let (results, _) = index.search("here");
-        let texts: Vec<&str> = results[0]
-            .snippet
-            .iter()
-            .map(|piece| &*piece.text)
-            .collect();
-        assert_eq!(texts[0], "…");
-        assert_eq!(texts[2], "here");
-        assert_eq!(*texts.last().unwrap(), "…");
-        assert!(texts.concat().len() < 4 * SNIPPET_BYTES, "{texts:?}");
-        // A single long word.
-        let index = Index::new([section("Word", &"ä".repeat(5000))]);
-        let (results, _) = index.search("ä");
-        let shown: usize = results[0]
-            .snippet
-            .iter()
-            .map(|piece| piece.text.len())
-            .sum();
-        assert!(shown < 4 * SNIPPET_BYTES);
-    }
-
-    #[test]
-    fn count_includes_results_that_are_not_shown() {
-        let index = Index::new((0..100).map(|_| section("Same", "puck")));
-        let (results, count) = index.search("puck");
-        assert_eq!((results.len(), count), (MAX_RESULTS, 100));
-    }
-}
+mod tests;

@@ -2,16 +2,47 @@
 
 use pulldown_cmark::{Event, TagEnd};
 
+/// What a section belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum SectionKind {
+    Document,
+    Operation,
+    Schema,
+}
+
+impl SectionKind {
+    /// In the order of search results.
+    pub(super) const ALL: [Self; 3] = [Self::Document, Self::Operation, Self::Schema];
+
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Document => "Documents",
+            Self::Operation => "API operations",
+            Self::Schema => "API schemas",
+        }
+    }
+}
+
 /// Text below a heading of the second or third level, or before the first one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Section {
+    pub(super) kind: SectionKind,
     /// Title of the page.
     pub(super) page: String,
     pub(super) heading: String,
+    /// Content of the page in one line; empty for sections other than its first.
+    pub(super) summary: String,
     /// Path of the page with the anchor of the heading.
     pub(super) href: String,
     /// The text in one line.
     pub(super) text: String,
+}
+
+impl Section {
+    /// Is it the first of its page? Its heading is the title.
+    pub(super) fn is_start(&self) -> bool {
+        self.heading == self.page
+    }
 }
 
 /// Collects the sections of a page while it is rendered.
@@ -24,12 +55,14 @@ pub(super) struct Sections {
 }
 
 impl Sections {
-    pub(super) fn new(path: &str, title: &str) -> Self {
+    pub(super) fn new(path: &str, title: &str, summary: &str) -> Self {
         Self {
             path: path.to_owned(),
             title: title.to_owned(),
             finished: Vec::new(),
             current: Section {
+                kind: SectionKind::Document,
+                summary: summary.to_owned(),
                 page: title.to_owned(),
                 heading: title.to_owned(),
                 href: path.to_owned(),
@@ -41,6 +74,8 @@ impl Sections {
     /// Starts a section at a heading.
     pub(super) fn start(&mut self, heading: &str, id: &str) {
         let next = Section {
+            kind: SectionKind::Document,
+            summary: String::new(),
             page: self.title.clone(),
             heading: heading.to_owned(),
             href: format!("{}#{id}", self.path),

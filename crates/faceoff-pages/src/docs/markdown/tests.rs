@@ -16,7 +16,7 @@ impl LinkResolver for RulesAndRobot {
 }
 
 fn html(markdown: &str) -> String {
-    render_document(markdown, "/docs/page", "Page", &RulesAndRobot).html
+    render_document(markdown, "/docs/page", "Page", "Summary.", &RulesAndRobot).html
 }
 
 #[test]
@@ -78,7 +78,7 @@ fn heading_ids_follow_github_rules() {
         ("Über snake_case", "über-snake_case"),
     ] {
         let markdown = format!("## {heading}\n\n## {heading}\n");
-        let rendered = render_document(&markdown, "/docs/page", "Page", &RulesAndRobot);
+        let rendered = render_document(&markdown, "/docs/page", "Page", "Summary.", &RulesAndRobot);
         let ids: Vec<&str> = rendered
             .contents
             .iter()
@@ -105,13 +105,32 @@ fn tables_are_scrollable_and_align_by_class() {
 }
 
 #[test]
+fn listing_has_a_name_and_coloured_code() {
+    let page = html("## Start\n\n```console\n$ ls <a>\n```\n\n```toml\na = 1 # b\n```\n");
+    for part in [
+        r#"<pre tabindex="0" role="group" aria-label="Commands 1: Start"><code><span class="prompt">$ </span>"#,
+        "<span class=\"command\">ls &#60;a&#62;</span>\n</code></pre></div>",
+        r#"aria-label="Listing 2: Start"><code><span class="code-key">a</span> = "#,
+    ] {
+        assert!(page.contains(part), "{part}: {page}");
+    }
+}
+
+#[test]
 fn sections_have_the_text_below_their_headings() {
     let rendered = render_document(
         "# Page\n\nIntro\nhere.\n\n## One\n\nA **b**c.\n\n- d\n- e\n\n### Two\n\n```\ncode\n```\n\n| x | y |\n|---|---|\n| [rules.md](rules.md) | 2 |\n",
         "/docs/page",
         "Page",
+        "Summary.",
         &RulesAndRobot,
     );
+    let summaries: Vec<&str> = rendered
+        .sections
+        .iter()
+        .map(|section| &*section.summary)
+        .collect();
+    assert_eq!(summaries, ["Summary.", "", ""]);
     let sections: Vec<(&str, &str, &str)> = rendered
         .sections
         .iter()
