@@ -2,7 +2,7 @@
 
 /** Exponents that make width and opacity from the age of a point: 1 at the new end, 0 at the old end. */
 export const WIDTH_EXPONENT = 0.7;
-export const OPACITY_EXPONENT = 1.2;
+export const OPACITY_EXPONENT = 0.8;
 
 /** Age of a point of a trail from `from` to `to`: 1 at the new end, 0 at the old end and before it. */
 export function freshness(position: number, from: number, to: number): number {

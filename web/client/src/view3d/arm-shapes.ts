@@ -28,7 +28,7 @@ const METAL: Paint = ["rp-rim", "white", 0.45];
 /** Outer radii of the housings at the joints, m. */
 const RADII_M = [0.102, 0.098, 0.084, 0.086, 0.07, 0.067, 0.046];
 /** Narrowest radius of the housing between a joint and the next, m. */
-const WAISTS_M = [0.09, 0.076, 0.074, 0.066, 0.056, 0.06];
+const WAISTS_M = [0.092, 0.08, 0.077, 0.069, 0.059, 0.06];
 const FLANGE_LENGTH_M = 0.05;
 const ROD_RADIUS_M = 0.0125;
 
@@ -88,11 +88,11 @@ function across(i: number, paint: ArmPaint): Piece[] {
   const radius = RADII_M[i];
   const next = RADII_M[i + 1];
   const length = MODEL.links[i + 1].position_m[1];
-  const half = radius * 1.04;
+  const half = radius * 1.0;
   const pieces: Piece[] = [
-    { geometry: drum(radius * 0.9, -half, half, radius * 0.3), paint: paint.link, body },
-    { geometry: drum(radius * 0.62, -half - 0.007, half + 0.007, 0.005), paint: paint.joint, body },
-    { geometry: drum(radius * 0.3, -half - 0.009, half + 0.009, 0.002), paint: DARK, body },
+    { geometry: drum(radius * 0.84, -half, half, radius * 0.36), paint: paint.link, body },
+    { geometry: drum(radius * 0.58, -half - 0.007, half + 0.007, 0.005), paint: paint.joint, body },
+    { geometry: drum(radius * 0.27, -half - 0.009, half + 0.009, 0.002), paint: DARK, body },
   ];
   if (i === 5) {
     // The hand is short: its housing is a ball around the joint and a neck to the flange.

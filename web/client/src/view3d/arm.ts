@@ -1,10 +1,11 @@
 // The arm in the 3-D view.
 
-import { Bone, MeshStandardMaterial, Skeleton, SkinnedMesh } from "three";
+import { Bone, Skeleton, SkinnedMesh } from "three";
 import type { Frame, Kinematics } from "../model/kinematics";
 import type { Palette } from "../replay/palette";
 import { armPieces, BASE_BODY, BODY_COUNT, MALLET_BODY } from "./arm-shapes";
 import { ColouredGeometry } from "./coloured-geometry";
+import { glossyMaterial } from "./glossy";
 
 /** An arm: base, links and mallet as one mesh, whose rigid bodies are the bones of a skeleton. */
 export class ArmModel {
@@ -14,10 +15,7 @@ export class ArmModel {
 
   constructor(arm: Kinematics, floorZ: number) {
     this.painted = new ColouredGeometry(armPieces(arm.side, floorZ));
-    this.mesh = new SkinnedMesh(
-      this.painted.geometry,
-      new MeshStandardMaterial({ vertexColors: true, roughness: 0.42, metalness: 0 }),
-    );
+    this.mesh = new SkinnedMesh(this.painted.geometry, glossyMaterial(0.45));
     this.mesh.castShadow = true;
     // Its extent would have to be computed from the bones in each frame.
     this.mesh.frustumCulled = false;

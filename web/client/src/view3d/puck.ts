@@ -5,7 +5,6 @@ import {
   Group,
   Mesh,
   MeshBasicMaterial,
-  MeshStandardMaterial,
   RingGeometry,
   TorusGeometry,
   type BufferGeometry,
@@ -14,6 +13,7 @@ import { MODEL } from "../model/model";
 import type { Palette } from "../replay/palette";
 import type { FrameState } from "../replay/frame-state";
 import { ColouredGeometry } from "./coloured-geometry";
+import { glossyMaterial } from "./glossy";
 import { arc, drum, mark } from "./shapes";
 
 const { radius_m: RADIUS, height_m: HEIGHT } = MODEL.puck;
@@ -41,10 +41,7 @@ export class PuckModel {
   private readonly lost: Mesh;
 
   constructor() {
-    this.puck = new Mesh(
-      this.painted.geometry,
-      new MeshStandardMaterial({ vertexColors: true, roughness: 0.4 }),
-    );
+    this.puck = new Mesh(this.painted.geometry, glossyMaterial(0.4));
     this.puck.castShadow = true;
     this.halo = new Mesh(
       haloGeometry(),

@@ -1,19 +1,13 @@
-// The room around the table: floor, lights and what shiny parts reflect.
+// The room around the table: floor and lights.
 
 import {
-  BackSide,
-  BoxGeometry,
   BufferAttribute,
   Color,
   DirectionalLight,
   HemisphereLight,
   Mesh,
   MeshBasicMaterial,
-  PMREMGenerator,
-  Scene,
   type BufferGeometry,
-  type WebGLRenderer,
-  type WebGLRenderTarget,
 } from "three";
 import { MODEL } from "../model/model";
 import { OUTER_HALF_SIZE } from "../model/table";
@@ -22,7 +16,7 @@ import { mix } from "./coloured-geometry";
 import { sheet } from "./shapes";
 
 /** Height of the floor in the table frame, m. For drawing only: the simulation ends at the table. */
-export const FLOOR_Z_M = -0.62;
+export const FLOOR_Z_M = -0.56;
 
 /** The floor ends where its colour has become that of the backdrop, m. */
 const FLOOR_HALF_SIZE_M = 5;
@@ -30,8 +24,6 @@ const FLOOR_CELLS = 72;
 /** Share of the light that the middle of the table's shadow on the floor takes away. */
 const TABLE_SHADE = 0.34;
 const PEDESTAL_SHADE = 0.3;
-/** Edge length of the reflected surroundings in pixels. Rough surfaces show no more of them. */
-const SURROUNDINGS_PIXELS = 64;
 
 /** The floor with soft shadows of table and pedestals, which never change: they are colours of its vertices. */
 export class Floor {
@@ -86,7 +78,7 @@ function smooth(from: number, to: number, value: number): number {
 
 /** Light of the sky, and light from above and the side, so that the shadow of a mallet shows its height. */
 export function lights(): [HemisphereLight, DirectionalLight] {
-  const sun = new DirectionalLight(0xffffff, 1.9);
+  const sun = new DirectionalLight(0xffffff, 1.55);
   sun.position.set(-0.7, -1.2, 3);
   sun.castShadow = true;
   // Shadows fall on the table only; the map is no larger than that.
@@ -100,39 +92,8 @@ export function lights(): [HemisphereLight, DirectionalLight] {
   shadow.camera.far = 5;
   shadow.normalBias = 0.01;
   shadow.radius = 4;
-  shadow.intensity = 0.55;
-  return [new HemisphereLight(0xffffff, 0xb9c0c9, 1.5), sun];
-}
-
-/** What shiny parts reflect: a bright ceiling with lamps over a dim floor. */
-export function surroundings(renderer: WebGLRenderer): WebGLRenderTarget {
-  const scene = new Scene();
-  const box = new BoxGeometry();
-  const add = (
-    brightness: number,
-    size: readonly number[],
-    place: readonly number[],
-    inside = false,
-  ): void => {
-    const material = new MeshBasicMaterial(inside ? { side: BackSide } : {});
-    material.color.setScalar(brightness);
-    const mesh = new Mesh(box, material);
-    mesh.scale.set(size[0], size[1], size[2]);
-    mesh.position.set(place[0], place[1], place[2]);
-    scene.add(mesh);
-  };
-  add(0.35, [20, 20, 10], [0, 0, 2], true);
-  add(0.6, [20, 20, 0.1], [0, 0, 6.9]);
-  add(0.12, [20, 20, 0.1], [0, 0, -2.9]);
-  add(5, [5, 2, 0.1], [-2, -4, 6]);
-  add(3, [2, 6, 0.1], [5, 2, 6]);
-  add(2.5, [0.1, 7, 2], [-9, 0, 3]);
-  add(1.6, [8, 0.1, 1.6], [0, 9, 2.5]);
-  const generator = new PMREMGenerator(renderer);
-  const target = generator.fromScene(scene, 0.03, 0.1, 50, { size: SURROUNDINGS_PIXELS });
-  generator.dispose();
-  for (const object of scene.children)
-    if (object instanceof Mesh) (object.material as MeshBasicMaterial).dispose();
-  box.dispose();
-  return target;
+  shadow.intensity = 0.7;
+  const sky = new HemisphereLight(0xffffff, 0x8b95a1, 1.75);
+  sky.position.set(0, 0, 1);
+  return [sky, sun];
 }

@@ -10,7 +10,7 @@ const RAD_PER_DEG = Math.PI / 180;
 /** Share of the picture that stays free on each side. */
 const MARGIN = 0.035;
 /** Around the base: what an arm needs at most when it plays, m. */
-const ARM = { halfWidth: 0.13, behind: 0.2, height: 0.78 };
+const ARM = { halfWidth: 0.13, behind: 0.2, height: 0.87 };
 /** Half the size of what is shown around the puck, m. */
 const NEAR_PUCK = { x: 0.62, y: 0.42, height: 0.3 };
 /** The camera follows the puck by these shares, so that the table moves less. */
@@ -39,9 +39,12 @@ export function pointsOf(camera: Camera, arms: number): Point3[] {
   const { x, y } = OUTER_HALF_SIZE;
   const tray = x + 0.08;
   const table = corners([-tray, tray], [-y, y], [0, 0.03]);
+  const bases = MODEL.bases.slice(0, arms);
   if (camera === "robot") return table;
+  // What is high above the table would push the camera away from it.
+  if (camera === "above") return [...table, ...bases.map((base) => ({ x: base.x_m, y: base.y_m, z: 0 }))];
   const feet = corners([-0.9, 0.9], [-0.48, 0.48], [FLOOR_Z_M]);
-  return [...table, ...feet, ...MODEL.bases.slice(0, arms).flatMap(armPoints)];
+  return [...table, ...feet, ...bases.flatMap(armPoints)];
 }
 
 function armPoints(base: (typeof MODEL.bases)[number]): Point3[] {

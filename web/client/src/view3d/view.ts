@@ -1,14 +1,6 @@
 // The 3-D view: everything with three.js on a WebGL canvas.
 
-import {
-  Color,
-  DirectionalLight,
-  PCFShadowMap,
-  PerspectiveCamera,
-  Scene,
-  WebGLRenderer,
-  type WebGLRenderTarget,
-} from "three";
+import { Color, DirectionalLight, PCFShadowMap, PerspectiveCamera, Scene, WebGLRenderer } from "three";
 import type { Contest } from "../clip/motion";
 import type { Palette } from "../replay/palette";
 import { trailRange, type FrameState, type View } from "../replay/frame-state";
@@ -20,7 +12,7 @@ import { Orbit } from "./orbit";
 import { followPointer } from "./pointer";
 import { PuckModel } from "./puck";
 import { Ribbon } from "./ribbon";
-import { Floor, FLOOR_Z_M, lights, surroundings } from "./room";
+import { Floor, FLOOR_Z_M, lights } from "./room";
 import { TableModel } from "./table";
 
 const FIELD_OF_VIEW_DEG = 28;
@@ -42,7 +34,6 @@ export class View3D implements View {
   private readonly commandedPath = new Ribbon(true);
   private readonly arms: ArmModel[] = [];
   private table: TableModel | null = null;
-  private reflected: WebGLRenderTarget | null = null;
   private palette: Palette | null = null;
   private readonly quality = new RenderQuality();
   private ratio = 1;
@@ -66,12 +57,6 @@ export class View3D implements View {
     followPointer(this.canvas, this.orbit);
     this.camera.up.set(0, 0, 1);
     this.scene.background = new Color();
-    this.scene.environmentIntensity = 0.45;
-    this.reflect();
-    // What was drawn before is lost together with the context.
-    this.canvas.addEventListener("webglcontextrestored", () => {
-      this.reflect();
-    });
     this.scene.add(...lights(), this.floor.mesh);
     // Flat things just above the table, from bottom to top.
     const layers = [
@@ -163,12 +148,6 @@ export class View3D implements View {
   private frameCamera(): void {
     const field = fieldOf((FIELD_OF_VIEW_DEG * Math.PI) / 180, this.camera.aspect);
     this.orbit.frame(field, Math.max(this.arms.length, 1));
-  }
-
-  private reflect(): void {
-    this.reflected?.dispose();
-    this.reflected = surroundings(this.renderer);
-    this.scene.environment = this.reflected.texture;
   }
 
   private placeCamera(): void {
