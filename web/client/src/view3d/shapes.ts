@@ -13,10 +13,10 @@ import {
 /** A point of a profile: distance from the axis, and position along it. */
 export type ProfilePoint = readonly [radius: number, along: number];
 
-const ROUND_STEPS = 4;
+const ROUND_STEPS = 3;
 
 /** A shape about z from its profile, which runs from low to high z. */
-export function turned(profile: readonly ProfilePoint[], sides = 32): BufferGeometry {
+export function turned(profile: readonly ProfilePoint[], sides = 24): BufferGeometry {
   // The lathe rotates about y; rotate the axis to z.
   const points = profile.map(([radius, along]) => new Vector2(radius, along));
   return new LatheGeometry(points, sides).rotateX(Math.PI / 2);
@@ -29,7 +29,7 @@ export function drum(
   to: number,
   round: number,
   toRadius = fromRadius,
-  sides = 32,
+  sides = 24,
 ): BufferGeometry {
   const profile: ProfilePoint[] = [[0, from]];
   for (let i = 0; i <= ROUND_STEPS; i++) {
@@ -55,7 +55,7 @@ export function limb(length: number, fromRadius: number, waist: number, toRadius
     [fromRadius - 0.0015, 0.0015],
     [fromRadius, 0.006],
   ];
-  const steps = 9;
+  const steps = 7;
   for (let i = 1; i <= steps; i++) {
     const share = i / steps;
     // The waist is smooth at both ends.
