@@ -9,6 +9,7 @@ const CAMERA_NAMES: Record<Camera, string> = {
   side: "Side",
   robot: "Robot’s view",
   above: "Above",
+  follow: "Follow puck",
 };
 
 export interface CameraActions {

@@ -3,7 +3,7 @@
 import type { Contest } from "../clip/motion";
 import { fixed } from "../controls/format";
 import { MODEL } from "../model/model";
-import { OUTER_HALF_SIZE, rimOutline, successRegion } from "../model/table";
+import { CENTRE_CIRCLE_RADIUS_M, OUTER_HALF_SIZE, roundedRimOutline, successRegion } from "../model/table";
 import type { Palette } from "../replay/palette";
 import type { Projection } from "./projection";
 
@@ -26,16 +26,19 @@ export function drawTable(
   context.fillStyle = palette["rp-backdrop"];
   context.fillRect(0, 0, projection.width, projection.height);
   context.fillStyle = palette["rp-table"];
-  context.fillRect(
-    projection.x(-OUTER_HALF_SIZE.x),
-    projection.y(OUTER_HALF_SIZE.y),
-    projection.length(2 * OUTER_HALF_SIZE.x),
-    projection.length(2 * OUTER_HALF_SIZE.y),
-  );
+  // Up to the outer edge in the goals only: the outer corners of the rims are round.
+  const { half_length_m, half_width_m, goal_half_width_m } = MODEL.table;
+  fillMiddle(context, projection, half_length_m, half_width_m);
+  fillMiddle(context, projection, OUTER_HALF_SIZE.x, goal_half_width_m + MODEL.table.post_radius_m);
   drawLines(context, projection, palette);
   drawRegion(context, projection, palette, contest);
   drawRims(context, projection, palette);
   drawAxes(context, projection, palette);
+}
+
+/** Fills a rectangle around the centre of the table. */
+function fillMiddle(context: CanvasRenderingContext2D, projection: Projection, x: number, y: number): void {
+  context.fillRect(projection.x(-x), projection.y(y), projection.length(2 * x), projection.length(2 * y));
 }
 
 function drawLines(context: CanvasRenderingContext2D, projection: Projection, palette: Palette): void {
@@ -45,11 +48,24 @@ function drawLines(context: CanvasRenderingContext2D, projection: Projection, pa
   context.beginPath();
   context.moveTo(projection.x(0), projection.y(half_width_m));
   context.lineTo(projection.x(0), projection.y(-half_width_m));
-  for (const x of [-half_length_m, half_length_m]) {
-    context.moveTo(projection.x(x), projection.y(goal_half_width_m));
-    context.lineTo(projection.x(x), projection.y(-goal_half_width_m));
-  }
+  const radius = projection.length(CENTRE_CIRCLE_RADIUS_M);
+  context.moveTo(projection.x(0) + radius, projection.y(0));
+  context.arc(projection.x(0), projection.y(0), radius, 0, 2 * Math.PI);
   context.stroke();
+  // The space in front of the goals, and the goal lines in the colours of the sides.
+  for (const side of [-1, 1]) {
+    const x = projection.x(side * half_length_m);
+    const width = projection.length(goal_half_width_m);
+    context.strokeStyle = palette["rp-mark"];
+    context.beginPath();
+    context.arc(x, projection.y(0), width, Math.PI / 2, -Math.PI / 2, side < 0);
+    context.stroke();
+    context.strokeStyle = palette[side < 0 ? "rp-joint" : "rp-other-joint"];
+    context.beginPath();
+    context.moveTo(x, projection.y(goal_half_width_m));
+    context.lineTo(x, projection.y(-goal_half_width_m));
+    context.stroke();
+  }
 }
 
 function drawRegion(
@@ -76,7 +92,7 @@ function drawRegion(
 }
 
 function drawRims(context: CanvasRenderingContext2D, projection: Projection, palette: Palette): void {
-  const outline = rimOutline();
+  const outline = roundedRimOutline();
   context.fillStyle = palette["rp-rim"];
   for (const mirror of [1, -1]) {
     context.beginPath();

@@ -3,6 +3,7 @@
 import type { Contest } from "../clip/motion";
 import { MODEL } from "../model/model";
 import { pointsBetween, type Path } from "../motion/paths";
+import { freshness, OPACITY_EXPONENT, WIDTH_EXPONENT } from "../motion/taper";
 import type { Palette } from "../replay/palette";
 import { trailRange, type FrameState, type View } from "../replay/frame-state";
 import { drawArm, drawMallet, type ArmColours } from "./arm";
@@ -13,6 +14,12 @@ import { drawTable } from "./table";
 const COMMANDED_DASHES = [5, 3];
 const SEEN_DASHES = [4, 3];
 const SOLID: number[] = [];
+/** Width of a trail at its new end, pixels. */
+const TRAIL_WIDTH = 3;
+/** A trail is drawn in this number of parts, each of one width and opacity. */
+const TRAIL_PARTS = 12;
+/** Size of the halo relative to the puck, its least radius in pixels, and its opacity. */
+const HALO = { size: 1.9, leastRadius: 9, opacity: 0.22 };
 
 /** The table from above, to scale, with its axes. Needs no WebGL. */
 export class FlatView implements View {
@@ -64,15 +71,18 @@ export class FlatView implements View {
     for (let i = 0; i < motion.arms.length; i++) drawArm(context, at, frame.arms[i], arms[i]);
     const [from, to] = trailRange(frame);
     if (frame.layers.puck) {
-      this.drawLine(paths.puck, from, to, palette["rp-trail"], SOLID);
+      this.drawTrail(paths.puck, from, to, palette["rp-trail"]);
       this.drawContacts(frame, from, to, palette);
     }
     for (let i = 0; i < motion.arms.length; i++) drawMallet(context, at, frame.arms[i], arms[i]);
     if (frame.layers.mallet) {
-      for (const path of paths.mallets) this.drawLine(path, from, to, palette.ink, SOLID);
+      paths.mallets.forEach((path, side) => {
+        this.drawTrail(path, from, to, palette[side === 0 ? "rp-mallet" : "rp-other-mallet"]);
+      });
     }
     if (frame.layers.commanded && paths.commanded !== null) {
-      this.drawLine(paths.commanded, from, to, palette["rp-commanded"], COMMANDED_DASHES);
+      const [first, last] = pointsBetween(paths.commanded, from, to);
+      this.drawLine(paths.commanded, first, last, palette["rp-commanded"], COMMANDED_DASHES, 1.5);
     }
     this.drawPuck(frame, palette);
     if (observed !== null && frame.layers.seen) this.drawSeenPuck(frame, palette);
@@ -88,11 +98,36 @@ export class FlatView implements View {
     this.backgroundContest = contest;
   }
 
-  private drawLine(path: Path, from: number, to: number, colour: string, dashes: number[]): void {
-    const { context, projection: at } = this;
+  /** A line that becomes narrower and paler towards its old end. */
+  private drawTrail(path: Path, from: number, to: number, colour: string): void {
+    const { context } = this;
     const [first, last] = pointsBetween(path, from, to);
+    // The whole path has one width.
+    const parts = from === -Infinity ? 1 : TRAIL_PARTS;
+    const index = (part: number): number => first + Math.round(((last - first) * part) / parts);
+    for (let i = 0; i < parts; i++) {
+      const [start, end] = [index(i), index(i + 1)];
+      if (end <= start) continue;
+      const fresh = freshness((path.positions[start] + path.positions[end]) / 2, from, to);
+      context.globalAlpha = fresh ** OPACITY_EXPONENT;
+      this.drawLine(path, start, end, colour, SOLID, TRAIL_WIDTH * fresh ** WIDTH_EXPONENT);
+    }
+    context.globalAlpha = 1;
+  }
+
+  /** The line between two points of a path. */
+  private drawLine(
+    path: Path,
+    first: number,
+    last: number,
+    colour: string,
+    dashes: number[],
+    width: number,
+  ): void {
+    const { context, projection: at } = this;
     context.strokeStyle = colour;
-    context.lineWidth = 1.5;
+    context.lineWidth = width;
+    context.lineCap = "butt";
     context.setLineDash(dashes);
     context.beginPath();
     let pen = false;
@@ -129,6 +164,12 @@ export class FlatView implements View {
     const { x, y, yaw } = frame.pose;
     const radius = at.length(MODEL.puck.radius_m);
     context.fillStyle = palette["rp-puck"];
+    // A halo makes the puck visible in small pictures.
+    context.globalAlpha = HALO.opacity;
+    context.beginPath();
+    context.arc(at.x(x), at.y(y), Math.max(radius * HALO.size, HALO.leastRadius), 0, 2 * Math.PI);
+    context.fill();
+    context.globalAlpha = 1;
     context.beginPath();
     context.arc(at.x(x), at.y(y), radius, 0, 2 * Math.PI);
     context.fill();

@@ -39,6 +39,31 @@ export function rimOutline(): Point[] {
   }
 }
 
+/** The table has no centre circle in the model; it is drawn as wide as a goal. */
+export const CENTRE_CIRCLE_RADIUS_M = MODEL.table.goal_half_width_m;
+
+/** Radius for drawing of the table's outer corners, which nothing touches, m. */
+const OUTER_CORNER_RADIUS_M = 0.06;
+const CHORDS_PER_OUTER_CORNER = 6;
+
+/** The outline of the rim at positive y with rounded outer corners. */
+export function roundedRimOutline(): Point[] {
+  const { x, y } = OUTER_HALF_SIZE;
+  return rimOutline().flatMap((point): Point[] => {
+    if (Math.abs(point[0]) !== x || point[1] !== y) return [point];
+    const side = Math.sign(point[0]);
+    return Array.from({ length: CHORDS_PER_OUTER_CORNER + 1 }, (_, i) => {
+      // Anticlockwise on the left, which is the last point; the outline continues on the right.
+      const share = side > 0 ? 1 - i / CHORDS_PER_OUTER_CORNER : i / CHORDS_PER_OUTER_CORNER;
+      const angle = (share * Math.PI) / 2;
+      return [
+        side * (x - OUTER_CORNER_RADIUS_M + OUTER_CORNER_RADIUS_M * Math.cos(angle)),
+        y - OUTER_CORNER_RADIUS_M + OUTER_CORNER_RADIUS_M * Math.sin(angle),
+      ];
+    });
+  });
+}
+
 /** Region in which the puck must end for a success; games have none. */
 export interface Region {
   readonly x_from_m: number;

@@ -2,7 +2,7 @@
 
 import { SPEEDS } from "./clock";
 
-export const CAMERAS = ["corner", "side", "robot", "above"] as const;
+export const CAMERAS = ["corner", "side", "robot", "above", "follow"] as const;
 export type Camera = (typeof CAMERAS)[number];
 
 /** Moment and view of a link into a replay; missing fields keep their current values. */

@@ -388,7 +388,7 @@ export class Viewer {
 
     this.updatePose(frame, position, step);
     const orbit = this.picture.view3d?.orbit;
-    const moving = !this.picture.isFlat && orbit?.tick(nowMs) === true;
+    const moving = !this.picture.isFlat && orbit?.tick(nowMs, frame.pose) === true;
     const calls = this.picture.draw(frame);
     this.updateValues(frame, step, nowMs);
     this.cameras.update(this.picture.isFlat, this.camera(), this.picture.unavailable === null);

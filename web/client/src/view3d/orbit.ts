@@ -1,102 +1,143 @@
 // The camera of the 3-D view, which moves on a sphere around a point of the table.
 
 import type { Camera } from "../replay/fragment";
-
-/** Camera position: the point x, y, z that it looks at, and its angles (rad) and distance (m) from there. */
-interface CameraPosition {
-  readonly x: number;
-  readonly y: number;
-  readonly z: number;
-  readonly azimuth: number;
-  readonly elevation: number;
-  readonly distance: number;
-}
+import { cameraAxes, type CameraPosition, type Field } from "./framing";
+import { cameraPosition, followedPoint } from "./scenes";
 
 const RAD_PER_DEG = Math.PI / 180;
-
-const PRESETS: Record<Camera, CameraPosition> = {
-  corner: { x: -0.27, y: 0, z: 0.08, azimuth: -58 * RAD_PER_DEG, elevation: 30 * RAD_PER_DEG, distance: 4.0 },
-  side: { x: -0.3, y: 0, z: 0.2, azimuth: -90 * RAD_PER_DEG, elevation: 14 * RAD_PER_DEG, distance: 3.6 },
-  robot: { x: -0.16, y: 0, z: 0, azimuth: 180 * RAD_PER_DEG, elevation: 62 * RAD_PER_DEG, distance: 3.6 },
-  above: { x: -0.34, y: 0, z: 0, azimuth: -90 * RAD_PER_DEG, elevation: 89.5 * RAD_PER_DEG, distance: 3.6 },
-};
-
 const TURN_STEP_RAD = 15 * RAD_PER_DEG;
 /** Distance after a zoom step, relative to the distance before. */
 const ZOOM_FACTOR = 0.85;
 const RADIANS_PER_PIXEL = 0.006;
-/** With a second arm the camera is farther away. */
-const TWO_ARM_DISTANCE_FACTOR = 1.2;
 const ANIMATION_MS = 350;
+/** Time in which the camera makes up for most of its distance from the puck that it follows. */
+const FOLLOW_MS = 220;
+/** A longer time between two frames is a pause. */
+const LONGEST_FRAME_MS = 100;
+/** The camera rests when it is closer than this, m. */
+const RESTING_M = 0.001;
 const ELEVATION_RANGE_RAD = [2 * RAD_PER_DEG, 89.5 * RAD_PER_DEG] as const;
-const DISTANCE_RANGE_M = [0.6, 9] as const;
+const DISTANCE_RANGE_M = [0.6, 25] as const;
+/** How far from the middle of the table the camera may look, m. */
+const PAN_RANGE_M = [-1.6, 1.6] as const;
 
 /** The camera with its animated movements. */
-export class Orbit {
+export class Orbit implements CameraPosition {
   x = 0;
   y = 0;
   z = 0;
   azimuth = 0;
   elevation = 0;
   distance = 1;
-  /** The selected preset; null after manual turning. */
+  /** The selected camera; null after manual movement. */
   camera: Camera | null = "corner";
   private animationStart: CameraPosition | null = null;
-  private target: CameraPosition = PRESETS.corner;
+  private target: CameraPosition;
   private startedMs = 0;
-  private hasTwoArms = false;
+  private previousMs = -Infinity;
+  /** Arms on the table. */
+  private arms = 1;
+  private field: Field = { tanX: 0.4, tanY: 0.25 };
 
-  /** `still`: the visitor prefers reduced motion. */
+  /** `prefersReducedMotion`: the camera jumps. */
   constructor(
     private readonly prefersReducedMotion: boolean,
     private readonly changed: () => void,
   ) {
-    this.moveTo(PRESETS.corner);
+    this.target = cameraPosition("corner", this.arms, this.field);
+    this.moveTo(this.target);
   }
 
   preset(camera: Camera): void {
     this.camera = camera;
-    this.animateTo(this.presetPosition(camera));
+    const position = cameraPosition(camera, this.arms, this.field);
+    // The camera that follows starts from where it looks; `tick` leads it to the puck.
+    this.animateTo(camera === "follow" ? { ...position, x: this.x, y: this.y } : position);
   }
 
-  /** Widens the view for a second arm; moves the camera at once if it is at a preset. */
-  widen(): void {
-    if (this.hasTwoArms) return;
-    this.hasTwoArms = true;
-    if (this.camera === null) return;
+  /** Fits the picture to another shape or number of arms, at once. */
+  frame(field: Field, arms: number): void {
+    const before = cameraPosition("corner", this.arms, this.field).distance;
+    this.field = field;
+    this.arms = arms;
     this.animationStart = null;
-    this.target = this.presetPosition(this.camera);
+    if (this.camera === null) {
+      // What was turned and zoomed by hand keeps its share of the picture.
+      const factor = cameraPosition("corner", arms, field).distance / before;
+      this.target = this.turned(this.target, 0, 0, factor);
+    } else {
+      const position = cameraPosition(this.camera, arms, field);
+      const { x, y } = this;
+      this.target = this.camera === "follow" ? { ...position, x, y } : position;
+    }
     this.moveTo(this.target);
   }
 
   turn(right: number, up: number): void {
-    this.camera = null;
+    this.leavePreset();
     this.animateTo(this.turned(this.target, right * TURN_STEP_RAD, up * TURN_STEP_RAD, 1));
   }
 
   zoom(steps: number): void {
-    this.camera = null;
+    this.leavePreset();
     this.animateTo(this.turned(this.target, 0, 0, ZOOM_FACTOR ** steps));
   }
 
   /** Turns by pointer movement in pixels, without animation. */
   drag(dx: number, dy: number): void {
-    this.camera = null;
-    this.animationStart = null;
-    this.target = this.turned(this, -dx * RADIANS_PER_PIXEL, dy * RADIANS_PER_PIXEL, 1);
-    this.moveTo(this.target);
-    this.changed();
+    this.leavePreset();
+    this.jumpTo(this.turned(this, -dx * RADIANS_PER_PIXEL, dy * RADIANS_PER_PIXEL, 1));
   }
 
-  /** Continues the animation; true until it is finished. */
-  tick(nowMs: number): boolean {
+  /**
+   * Moves with two fingers, without animation: by pixels over the table, by an angle about the vertical, and nearer by a
+   * factor. `height`: height of the picture in pixels.
+   */
+  pinch(dx: number, dy: number, angle: number, factor: number, height: number): void {
+    const metresPerPixel = (2 * this.distance * this.field.tanY) / height;
+    const position = this.turned(this, angle, 0, 1 / factor);
+    if (this.camera !== "follow") this.camera = null;
+    const { right, back } = cameraAxes(this.azimuth, 0);
+    // Seen flatly, a pixel covers more of the table, up to three times.
+    const away = dy / Math.max(Math.sin(this.elevation), 1 / 3);
+    this.jumpTo({
+      ...position,
+      x: clamp(position.x - (dx * right.x + away * back.x) * metresPerPixel, PAN_RANGE_M),
+      y: clamp(position.y - (dx * right.y + away * back.y) * metresPerPixel, PAN_RANGE_M),
+    });
+  }
+
+  /** Continues the animation and follows the puck; true until both are finished. */
+  tick(nowMs: number, puck: { readonly x: number; readonly y: number }): boolean {
+    const frameMs = Math.min(nowMs - this.previousMs, LONGEST_FRAME_MS);
+    this.previousMs = nowMs;
+    const isFollowing = this.camera === "follow" && this.follow(frameMs, puck);
+    return this.animate(nowMs) || isFollowing;
+  }
+
+  /** Leads the point that the camera looks at to the puck; true until it is there. */
+  private follow(frameMs: number, puck: { readonly x: number; readonly y: number }): boolean {
+    const goal = followedPoint(puck.x, puck.y);
+    const share = this.prefersReducedMotion ? 1 : 1 - Math.exp(-frameMs / FOLLOW_MS);
+    const x = this.x + (goal.x - this.x) * share;
+    const y = this.y + (goal.y - this.y) * share;
+    const isThere = Math.hypot(goal.x - x, goal.y - y) < RESTING_M;
+    this.x = isThere ? goal.x : x;
+    this.y = isThere ? goal.y : y;
+    this.target = { ...this.target, x: this.x, y: this.y };
+    return !isThere;
+  }
+
+  private animate(nowMs: number): boolean {
     const { animationStart: from, target: to } = this;
     if (from === null) return false;
     if (this.startedMs === 0) this.startedMs = nowMs;
     const share = Math.min((nowMs - this.startedMs) / ANIMATION_MS, 1);
     const s = share * share * (3 - 2 * share);
-    this.x = from.x + (to.x - from.x) * s;
-    this.y = from.y + (to.y - from.y) * s;
+    if (this.camera !== "follow") {
+      this.x = from.x + (to.x - from.x) * s;
+      this.y = from.y + (to.y - from.y) * s;
+    }
     this.z = from.z + (to.z - from.z) * s;
     this.azimuth = from.azimuth + (to.azimuth - from.azimuth) * s;
     this.elevation = from.elevation + (to.elevation - from.elevation) * s;
@@ -105,10 +146,9 @@ export class Orbit {
     return share < 1;
   }
 
-  private presetPosition(camera: Camera): CameraPosition {
-    const position = PRESETS[camera];
-    if (!this.hasTwoArms || camera === "robot") return position;
-    return { ...position, x: 0, distance: position.distance * TWO_ARM_DISTANCE_FACTOR };
+  /** Turning and zooming by hand leave the presets, but the camera that follows keeps following. */
+  private leavePreset(): void {
+    if (this.camera !== "follow") this.camera = null;
   }
 
   private animateTo(position: CameraPosition): void {
@@ -123,6 +163,13 @@ export class Orbit {
       this.animationStart = { x, y, z, azimuth, elevation, distance };
       this.startedMs = 0;
     }
+    this.changed();
+  }
+
+  private jumpTo(position: CameraPosition): void {
+    this.animationStart = null;
+    this.target = position;
+    this.moveTo(position);
     this.changed();
   }
 

@@ -1,47 +1,69 @@
 // The puck in the 3-D view.
 
-import { BoxGeometry, Group, Mesh, MeshBasicMaterial, MeshStandardMaterial, TorusGeometry } from "three";
+import {
+  BufferAttribute,
+  Group,
+  Mesh,
+  MeshBasicMaterial,
+  RingGeometry,
+  TorusGeometry,
+  type BufferGeometry,
+} from "three";
 import { MODEL } from "../model/model";
 import type { Palette } from "../replay/palette";
 import type { FrameState } from "../replay/frame-state";
 import { ColouredGeometry } from "./coloured-geometry";
-import { drum, mark } from "./shapes";
+import { glossyMaterial } from "./glossy";
+import { arc, drum, mark } from "./shapes";
 
 const { radius_m: RADIUS, height_m: HEIGHT } = MODEL.puck;
+/** Outer radius of the halo relative to the puck. */
+const HALO_SIZE = 2.4;
+const HALO_OPACITY = 0.5;
+/** The halo has at least this radius on the screen. */
+const LEAST_HALO_PIXELS = 15;
+/** Below the trails, above the lines on the table. */
+const HALO_Z_M = 0.0014;
 
-/** The puck, and its observed position. */
+/** The puck with a halo that makes it visible in small pictures, and its observed position. */
 export class PuckModel {
   readonly group = new Group();
   private readonly painted = new ColouredGeometry([
-    [drum(RADIUS, 0, HEIGHT, 0.003), "rp-puck"],
+    { geometry: drum(RADIUS, 0.0005, HEIGHT, 0.004), paint: "rp-puck" },
+    { geometry: arc(0, 0, RADIUS * 0.74, RADIUS * 0.12, HEIGHT + 0.0004, 0, 2 * Math.PI), paint: ["rp-puck", "white", 0.85] },
     // The line shows the orientation.
-    [new BoxGeometry(RADIUS * 0.8, 0.005, 0.001).translate(RADIUS * 0.4, 0, HEIGHT), "rp-table"],
-  ]);
+    { geometry: mark(0, 0, RADIUS * 0.68, 0, RADIUS * 0.12, HEIGHT), paint: ["rp-puck", "white", 0.85] },
+  ]); // prettier-ignore
   private readonly puck: Mesh;
+  private readonly halo: Mesh<BufferGeometry, MeshBasicMaterial>;
   private readonly seenColour = new MeshBasicMaterial();
   private readonly seen: Mesh;
   private readonly lost: Mesh;
 
   constructor() {
-    this.puck = new Mesh(
-      this.painted.geometry,
-      new MeshStandardMaterial({ vertexColors: true, roughness: 0.5 }),
-    );
+    this.puck = new Mesh(this.painted.geometry, glossyMaterial(0.4));
     this.puck.castShadow = true;
-    this.seen = new Mesh(new TorusGeometry(RADIUS, 0.0022, 8, 48), this.seenColour);
+    this.halo = new Mesh(
+      haloGeometry(),
+      new MeshBasicMaterial({ vertexColors: true, transparent: true, depthWrite: false }),
+    );
+    this.seen = new Mesh(new TorusGeometry(RADIUS, 0.0025, 8, 40), this.seenColour);
     const r = RADIUS * 0.8;
     const cross = new ColouredGeometry([
-      [mark(-r, -r, r, r, 0.005, 0), "rp-seen"],
-      [mark(-r, r, r, -r, 0.005, 0), "rp-seen"],
+      { geometry: mark(-r, -r, r, r, 0.005, 0), paint: "rp-seen" },
+      { geometry: mark(-r, r, r, -r, 0.005, 0), paint: "rp-seen" },
     ]);
     this.lost = new Mesh(cross.geometry, this.seenColour);
-    this.group.add(this.puck, this.seen, this.lost);
+    this.group.add(this.halo, this.puck, this.seen, this.lost);
   }
 
-  set(frame: FrameState): void {
+  /** `metresPerPixel`: size of a pixel of the picture at the table. */
+  set(frame: FrameState, metresPerPixel: number): void {
     const { pose } = frame;
     this.puck.position.set(pose.x, pose.y, 0);
     this.puck.rotation.z = pose.yaw;
+    this.halo.position.set(pose.x, pose.y, HALO_Z_M);
+    this.halo.scale.setScalar(haloScale(metresPerPixel));
     const seen = frame.layers.seen && !Number.isNaN(frame.seenX);
     this.seen.visible = seen;
     this.lost.visible = seen && frame.isPuckLost;
@@ -53,6 +75,25 @@ export class PuckModel {
 
   paint(palette: Palette): void {
     this.painted.paint(palette);
+    this.halo.material.color.set(palette["rp-puck"]);
     this.seenColour.color.set(palette["rp-seen"]);
   }
+}
+
+/** Scale of the halo at which it can be seen. */
+export function haloScale(metresPerPixel: number): number {
+  return Math.max(1, (LEAST_HALO_PIXELS * metresPerPixel) / (HALO_SIZE * RADIUS));
+}
+
+/** A disc that becomes transparent outwards. */
+function haloGeometry(): BufferGeometry {
+  const geometry = new RingGeometry(0, HALO_SIZE * RADIUS, 40, 6);
+  const position = geometry.getAttribute("position");
+  const colours = new Float32Array(4 * position.count).fill(1);
+  for (let i = 0; i < position.count; i++) {
+    const outwards = Math.hypot(position.getX(i), position.getY(i)) / (HALO_SIZE * RADIUS);
+    colours[4 * i + 3] = HALO_OPACITY * (1 - outwards) ** 1.5;
+  }
+  geometry.setAttribute("color", new BufferAttribute(colours, 4));
+  return geometry;
 }

@@ -9,32 +9,47 @@ import {
   MeshBasicMaterial,
   MeshLambertMaterial,
   PlaneGeometry,
-  ShadowMaterial,
   Shape,
   Vector2,
+  type BufferGeometry,
 } from "three";
 import type { Contest } from "../clip/motion";
 import { MODEL } from "../model/model";
-import { OUTER_HALF_SIZE, rimOutline, successRegion } from "../model/table";
+import {
+  CENTRE_CIRCLE_RADIUS_M,
+  OUTER_HALF_SIZE,
+  roundedRimOutline,
+  successRegion,
+  type Point,
+} from "../model/table";
 import type { Palette } from "../replay/palette";
-import { ColouredGeometry, type Piece } from "./coloured-geometry";
-import { mark } from "./shapes";
+import { ColouredGeometry, type Paint, type Piece } from "./coloured-geometry";
+import { FLOOR_Z_M } from "./room";
+import { arc, ball, drum, mark, sheet } from "./shapes";
 
 /** Height for drawing only, m: high enough to be visible, low enough not to hide the puck. */
-const RIM_HEIGHT_M = 0.028;
-const FLOOR_Z_M = MODEL.bases[0].z_m;
-const LINE_WIDTH_M = 0.006;
+const RIM_HEIGHT_M = 0.03;
+const RIM_ROUND_M = 0.007;
+const APRON_HEIGHT_M = 0.1;
+const LINE_WIDTH_M = 0.007;
+const LINE_Z_M = 0.0004;
 /** Length of a dash with its gap on the edge of the success region. */
 const DASH_LENGTH_M = 0.04;
 /** Length of a dash relative to a dash with its gap. */
 const DASH_SHARE = 0.55;
 
-/** Static objects: table, rims, lines, success region, and the floor for shadows. */
+/** The tray behind a goal, into which a puck falls, m. */
+const TRAY = { depth: 0.075, drop: 0.07, wall: 0.014, beside: 0.05 };
+const LEG = { x: 0.86, y: 0.44, topRadius: 0.05, footRadius: 0.034 };
+
+const BODY: Paint = ["rp-rim", "black", 0.35];
+const INSIDE: Paint = ["rp-rim", "black", 0.72];
+const LINE: Paint = ["rp-mark", "rp-rim", 0.25];
+
+/** Static objects: the table with legs, rims, goals and lines, and the success region. */
 export class TableModel {
   readonly group = new Group();
-  private readonly surface = new MeshLambertMaterial();
-  private readonly rims = new MeshLambertMaterial();
-  private readonly lines: ColouredGeometry;
+  private readonly table: ColouredGeometry;
   private readonly region = new MeshBasicMaterial({
     transparent: true,
     opacity: 0.1,
@@ -43,32 +58,16 @@ export class TableModel {
   });
 
   constructor(contest: Contest) {
-    const slab = new Mesh(
-      new BoxGeometry(2 * OUTER_HALF_SIZE.x, 2 * OUTER_HALF_SIZE.y, -FLOOR_Z_M),
-      this.surface,
-    );
-    slab.position.z = FLOOR_Z_M / 2;
-    slab.receiveShadow = true;
-
-    const outline = rimOutline();
-    const shapes = [1, -1].map((mirror) => new Shape(outline.map(([x, y]) => new Vector2(x, mirror * y))));
-    const rims = new Mesh(
-      new ExtrudeGeometry(shapes, { depth: RIM_HEIGHT_M, bevelEnabled: false }),
-      this.rims,
-    );
-    rims.receiveShadow = true;
-
-    const floor = new Mesh(new PlaneGeometry(9, 9), new ShadowMaterial({ opacity: 0.16 }));
-    floor.position.z = FLOOR_Z_M;
-    floor.receiveShadow = true;
-
-    this.lines = new ColouredGeometry(linePieces(contest));
-    this.group.add(
-      slab,
-      rims,
-      floor,
-      new Mesh(this.lines.geometry, new MeshBasicMaterial({ vertexColors: true })),
-    );
+    this.table = new ColouredGeometry([
+      ...topPieces(),
+      ...goalPieces(),
+      ...legPieces(),
+      ...linePieces(),
+      ...regionPieces(contest),
+    ]);
+    const table = new Mesh(this.table.geometry, new MeshLambertMaterial({ vertexColors: true }));
+    table.receiveShadow = true;
+    this.group.add(table);
 
     const place = successRegion(contest);
     if (place !== null) {
@@ -76,27 +75,158 @@ export class TableModel {
         new PlaneGeometry(place.x_to_m - place.x_from_m, 2 * place.half_width_m),
         this.region,
       );
-      field.position.set((place.x_from_m + place.x_to_m) / 2, 0, 0.0004);
+      field.position.set((place.x_from_m + place.x_to_m) / 2, 0, 0.0006);
       this.group.add(field);
+    }
+    for (const object of [this.group, ...this.group.children]) {
+      object.updateMatrix();
+      object.matrixAutoUpdate = false;
     }
   }
 
   paint(palette: Palette): void {
-    this.surface.color.set(palette["rp-table"]);
-    this.rims.color.set(palette["rp-rim"]);
     this.region.color.set(palette.good);
-    this.lines.paint(palette);
+    this.table.paint(palette);
   }
 }
 
-function linePieces(contest: Contest): Piece[] {
+/** Playing surface, rims and body. */
+function topPieces(): Piece[] {
+  const { half_length_m, half_width_m, goal_half_width_m, outer_half_length_m } = MODEL.table;
+  const surface: Piece = {
+    geometry: sheet(steps(half_length_m), steps(half_width_m), 0),
+    paint: "rp-table",
+    // Rims take light from the surface next to them.
+    shade: (x, y) =>
+      1 - 0.16 * rimShade(half_length_m - Math.abs(x)) - 0.16 * rimShade(half_width_m - Math.abs(y)),
+  };
+  const slots = [1, -1].map((side): Piece => {
+    const xs = [half_length_m, half_length_m + 0.03, half_length_m + 0.06, outer_half_length_m].map((x) => side * x);
+    return {
+      geometry: sheet(xs.sort((a, b) => a - b), [-goal_half_width_m - 0.02, 0, goal_half_width_m + 0.02], 0),
+      paint: "rp-table",
+      // Darker towards the tray.
+      shade: (x) => 1 - (0.55 * (Math.abs(x) - half_length_m)) / (outer_half_length_m - half_length_m),
+    };
+  }); // prettier-ignore
+  const rims = [1, -1].map((mirror): Piece => ({
+    geometry: extruded(roundedRimOutline(), mirror, RIM_HEIGHT_M, RIM_ROUND_M).translate(0, 0, -0.002),
+    paint: "rp-rim",
+  }));
+  const { x, y } = OUTER_HALF_SIZE;
+  const corner = 0.06;
+  const outline: Point[] = [];
+  for (const [sx, sy, start] of [[1, 1, 0], [-1, 1, 1], [-1, -1, 2], [1, -1, 3]] as const) {
+    for (let i = 0; i <= 6; i++) {
+      const angle = (start + i / 6) * (Math.PI / 2);
+      outline.push([sx * (x - 0.004 - corner) + corner * Math.cos(angle), sy * (y - 0.004 - corner) + corner * Math.sin(angle)]);
+    }
+  } // prettier-ignore
+  const apron: Piece = {
+    geometry: extruded(outline, 1, APRON_HEIGHT_M, 0.01).translate(0, 0, -APRON_HEIGHT_M - 0.0015),
+    paint: BODY,
+    shade: (_x, _y, z) => 1 + 2.5 * Math.max(z, -APRON_HEIGHT_M),
+  };
+  return [surface, ...slots, ...rims, apron];
+}
+
+/** From one edge to the other, with close steps at the edges, where the shade of the rims is. */
+function steps(half: number): number[] {
+  const outer = [half, half - 0.008, half - 0.02, half - 0.045, half - 0.08];
+  return [...outer.map((at) => -at), 0, ...outer.reverse()];
+}
+
+function rimShade(distance: number): number {
+  return Math.max(1 - distance / 0.08, 0) ** 2;
+}
+
+/** The trays behind the goals, edged in the colours of the sides. */
+function goalPieces(): Piece[] {
+  const { goal_half_width_m } = MODEL.table;
+  const from = OUTER_HALF_SIZE.x;
+  const half = goal_half_width_m + TRAY.beside;
+  const { depth, drop, wall } = TRAY;
+  const height = drop + RIM_HEIGHT_M - 0.006;
+  const pieces: Piece[] = [];
+  for (const side of [-1, 1]) {
+    const edge: Paint = ["rp-rim", side < 0 ? "rp-joint" : "rp-other-joint", 0.75];
+    const block = (x: number, y: number, w: number, d: number, paint: Paint): void => {
+      const outline: Point[] = [[w / 2, d / 2], [-w / 2, d / 2], [-w / 2, -d / 2], [w / 2, -d / 2]]; // prettier-ignore
+      pieces.push({
+        geometry: extruded(outline, 1, height, 0.004).translate(side * x, y, -drop),
+        paint,
+      });
+    };
+    block(from + depth - wall / 2, 0, wall, 2 * half, edge);
+    for (const end of [-1, 1]) block(from + depth / 2, end * (half - wall / 2), depth, wall, edge);
+    const bottom = new BoxGeometry(depth, 2 * half - wall, 0.01).translate(side * (from + depth / 2), 0, -drop + 0.005);
+    const back = new BoxGeometry(0.004, 2 * half - 2 * wall, drop).translate(side * (from + depth - wall - 0.002), 0, -drop / 2);
+    pieces.push({ geometry: bottom, paint: INSIDE }, { geometry: back, paint: INSIDE });
+  } // prettier-ignore
+  return pieces;
+}
+
+function legPieces(): Piece[] {
+  const pieces: Piece[] = [];
+  const top = -APRON_HEIGHT_M;
+  for (const [x, y] of [[1, 1], [-1, 1], [-1, -1], [1, -1]] as const) {
+    const shade = (_x: number, _y: number, z: number): number => 0.55 + (0.45 * (z - FLOOR_Z_M)) / (top - FLOOR_Z_M);
+    pieces.push({
+      geometry: drum(LEG.footRadius, FLOOR_Z_M + 0.02, top, 0.004, LEG.topRadius, 20).translate(x * LEG.x, y * LEG.y, 0),
+      paint: BODY,
+      shade,
+    });
+    const foot = ball(0.04).scale(1, 1, 0.5).translate(x * LEG.x, y * LEG.y, FLOOR_Z_M + 0.02);
+    pieces.push({ geometry: foot, paint: INSIDE });
+  } // prettier-ignore
+  return pieces;
+}
+
+/** A flat outline as a solid with rounded edges and its bottom at height 0; `mirror` −1 mirrors y. */
+function extruded(outline: readonly Point[], mirror: number, height: number, round: number): BufferGeometry {
+  const points = outline.map(([x, y]) => new Vector2(x, mirror * y));
+  return new ExtrudeGeometry(new Shape(points), {
+    depth: height - 2 * round,
+    bevelThickness: round,
+    bevelSize: round,
+    bevelOffset: -round,
+    bevelSegments: 3,
+    curveSegments: 1,
+  }).translate(0, 0, round);
+}
+
+/** Centre line, centre circle, and the goals with the space in front of them. */
+function linePieces(): Piece[] {
   const { half_length_m, half_width_m, goal_half_width_m } = MODEL.table;
-  const pieces: Piece[] = [[mark(0, -half_width_m, 0, half_width_m, LINE_WIDTH_M, 0.0005), "rp-mark"]];
-  for (const x of [-half_length_m, half_length_m]) {
-    pieces.push([mark(x, -goal_half_width_m, x, goal_half_width_m, LINE_WIDTH_M, 0.0005), "rp-mark"]);
+  const z = LINE_Z_M;
+  const pieces: Piece[] = [
+    { geometry: mark(0, -half_width_m, 0, half_width_m, LINE_WIDTH_M, z), paint: LINE },
+    {
+      geometry: arc(0, 0, CENTRE_CIRCLE_RADIUS_M, LINE_WIDTH_M, z + 0.0003, 0, 2 * Math.PI),
+      paint: LINE,
+    },
+    { geometry: drum(0.014, z, z + 0.0003, 0.0001), paint: LINE },
+  ];
+  for (const side of [-1, 1]) {
+    const x = side * half_length_m;
+    pieces.push(
+      {
+        geometry: mark(x, -goal_half_width_m, x, goal_half_width_m, LINE_WIDTH_M, z),
+        paint: side < 0 ? "rp-joint" : "rp-other-joint",
+      },
+      {
+        geometry: arc(x, 0, goal_half_width_m, LINE_WIDTH_M, z + 0.0003, (side * Math.PI) / 2, Math.PI),
+        paint: LINE,
+      },
+    );
   }
+  return pieces;
+}
+
+/** The dashed edge of the success region. */
+function regionPieces(contest: Contest): Piece[] {
   const region = successRegion(contest);
-  if (region === null) return pieces;
+  if (region === null) return [];
   const { x_from_m: x0, x_to_m: x1, half_width_m: y } = region;
   const sides = [
     [x0, -y, x0, y],
@@ -104,22 +234,14 @@ function linePieces(contest: Contest): Piece[] {
     [x0, y, x1, y],
     [x0, -y, x1, -y],
   ];
+  const pieces: Piece[] = [];
   for (const [ax, ay, bx, by] of sides) {
     const dashes = Math.max(Math.floor(Math.hypot(bx - ax, by - ay) / DASH_LENGTH_M), 1);
     for (let i = 0; i < dashes; i++) {
       const a = i / dashes;
       const b = (i + DASH_SHARE) / dashes;
-      pieces.push([
-        mark(
-          ax + (bx - ax) * a,
-          ay + (by - ay) * a,
-          ax + (bx - ax) * b,
-          ay + (by - ay) * b,
-          LINE_WIDTH_M / 2,
-          0.0006,
-        ),
-        "good",
-      ]);
+      const at = [ax + (bx - ax) * a, ay + (by - ay) * a, ax + (bx - ax) * b, ay + (by - ay) * b] as const;
+      pieces.push({ geometry: mark(...at, LINE_WIDTH_M / 2, LINE_Z_M + 0.0004), paint: "good" });
     }
   }
   return pieces;

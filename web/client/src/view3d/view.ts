@@ -1,28 +1,23 @@
 // The 3-D view: everything with three.js on a WebGL canvas.
 
-import {
-  Color,
-  DirectionalLight,
-  HemisphereLight,
-  PCFShadowMap,
-  PerspectiveCamera,
-  Scene,
-  WebGLRenderer,
-} from "three";
+import { Color, DirectionalLight, PCFShadowMap, PerspectiveCamera, Scene, WebGLRenderer } from "three";
 import type { Contest } from "../clip/motion";
 import type { Palette } from "../replay/palette";
 import { trailRange, type FrameState, type View } from "../replay/frame-state";
 import { ArmModel } from "./arm";
+import { ContactShadows } from "./contact-shadows";
+import { fieldOf } from "./framing";
 import { RenderQuality } from "./quality";
 import { Orbit } from "./orbit";
 import { followPointer } from "./pointer";
 import { PuckModel } from "./puck";
 import { Ribbon } from "./ribbon";
+import { Floor, FLOOR_Z_M, lights } from "./room";
 import { TableModel } from "./table";
 
-const FIELD_OF_VIEW_DEG = 30;
-/** Aspect ratio for which the presets are made; on a narrower picture the camera moves back. */
-const REFERENCE_ASPECT = 1.6;
+const FIELD_OF_VIEW_DEG = 28;
+/** Least width of a trail on the screen at its new end. */
+const LEAST_TRAIL_PIXELS = 3;
 
 /** Table, puck and arms in 3-D. The constructor throws without WebGL 2. */
 export class View3D implements View {
@@ -30,17 +25,19 @@ export class View3D implements View {
   readonly orbit: Orbit;
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
-  private readonly camera = new PerspectiveCamera(FIELD_OF_VIEW_DEG, REFERENCE_ASPECT, 0.05, 30);
+  private readonly camera = new PerspectiveCamera(FIELD_OF_VIEW_DEG, 1.6, 0.1, 60);
+  private readonly floor = new Floor();
   private readonly puck = new PuckModel();
+  private readonly contactShadows = new ContactShadows();
   private readonly puckPath = new Ribbon(false);
   private readonly malletPaths = [new Ribbon(false), new Ribbon(false)];
   private readonly commandedPath = new Ribbon(true);
   private readonly arms: ArmModel[] = [];
   private table: TableModel | null = null;
   private palette: Palette | null = null;
-  private distanceFactor = 1;
   private readonly quality = new RenderQuality();
   private ratio = 1;
+  private height = 1;
 
   constructor(prefersReducedMotion: boolean, changed: () => void) {
     this.canvas = document.createElement("canvas");
@@ -60,51 +57,60 @@ export class View3D implements View {
     followPointer(this.canvas, this.orbit);
     this.camera.up.set(0, 0, 1);
     this.scene.background = new Color();
-    this.scene.add(new HemisphereLight(0xffffff, 0xc8ccd2, 1.9), sun());
-    this.scene.add(
-      this.puck.group,
+    this.scene.add(...lights(), this.floor.mesh);
+    // Flat things just above the table, from bottom to top.
+    const layers = [
+      this.contactShadows.mesh,
       this.puckPath.mesh,
       this.commandedPath.mesh,
       ...this.malletPaths.map((ribbon) => ribbon.mesh),
-    );
+    ];
+    layers.forEach((mesh, i) => {
+      mesh.renderOrder = 1 + i;
+    });
+    this.scene.add(this.puck.group, ...layers);
   }
 
   resize(width: number, height: number, ratio: number): void {
     if (width === 0 || height === 0) return;
     this.ratio = ratio;
+    this.height = height;
     this.renderer.setPixelRatio(Math.min(ratio, this.quality.ratio));
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
-    this.distanceFactor = Math.max(REFERENCE_ASPECT / this.camera.aspect, 1);
+    this.frameCamera();
   }
 
   paint(palette: Palette): void {
     this.palette = palette;
     if (this.scene.background instanceof Color) this.scene.background.set(palette["rp-backdrop"]);
+    this.floor.paint(palette);
     this.table?.paint(palette);
     for (const arm of this.arms) arm.paint(palette);
     this.puck.paint(palette);
-    this.puckPath.mesh.material.color.set(palette["rp-trail"]);
-    for (const ribbon of this.malletPaths) ribbon.mesh.material.color.set(palette.ink);
-    this.commandedPath.mesh.material.color.set(palette["rp-commanded"]);
+    this.puckPath.paint(palette["rp-trail"]);
+    this.malletPaths[0].paint(palette["rp-mallet"]);
+    this.malletPaths[1].paint(palette["rp-other-mallet"]);
+    this.commandedPath.paint(palette["rp-commanded"]);
   }
 
   draw(frame: FrameState): number {
     const { motion, paths } = frame.part;
     this.addObjects(frame, motion.contest);
     for (let i = 0; i < this.arms.length; i++) this.arms[i].set(frame.arms[i]);
-    this.puck.set(frame);
+    const metresPerPixel =
+      (2 * this.orbit.distance * Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360)) / this.height;
+    this.puck.set(frame, metresPerPixel);
+    this.contactShadows.set(frame);
     const [from, to] = trailRange(frame);
-    this.puckPath.set(frame.layers.puck ? paths.puck : null, from, to);
+    const least = LEAST_TRAIL_PIXELS * metresPerPixel;
+    this.puckPath.set(frame.layers.puck ? paths.puck : null, from, to, least);
     for (let i = 0; i < this.malletPaths.length; i++) {
-      this.malletPaths[i].set(
-        frame.layers.mallet && i < paths.mallets.length ? paths.mallets[i] : null,
-        from,
-        to,
-      );
+      const path = frame.layers.mallet && i < paths.mallets.length ? paths.mallets[i] : null;
+      this.malletPaths[i].set(path, from, to, least);
     }
-    this.commandedPath.set(frame.layers.commanded ? paths.commanded : null, from, to);
+    this.commandedPath.set(frame.layers.commanded ? paths.commanded : null, from, to, least);
     this.placeCamera();
     this.renderer.info.reset();
     this.renderer.render(this.scene, this.camera);
@@ -131,40 +137,27 @@ export class View3D implements View {
       this.scene.add(this.table.group);
     }
     while (this.arms.length < count) {
-      const arm = new ArmModel(frame.arms[this.arms.length]);
+      const arm = new ArmModel(frame.arms[this.arms.length], FLOOR_Z_M);
       this.arms.push(arm);
-      this.scene.add(arm.group);
+      this.scene.add(arm.mesh);
     }
-    if (count > 1) this.orbit.widen();
+    this.frameCamera();
     if (this.palette !== null) this.paint(this.palette);
+  }
+
+  private frameCamera(): void {
+    const field = fieldOf((FIELD_OF_VIEW_DEG * Math.PI) / 180, this.camera.aspect);
+    this.orbit.frame(field, Math.max(this.arms.length, 1));
   }
 
   private placeCamera(): void {
     const { x, y, z, azimuth, elevation, distance } = this.orbit;
-    const flat = Math.cos(elevation) * distance * this.distanceFactor;
+    const flat = Math.cos(elevation) * distance;
     this.camera.position.set(
       x + flat * Math.cos(azimuth),
       y + flat * Math.sin(azimuth),
-      z + Math.sin(elevation) * distance * this.distanceFactor,
+      z + Math.sin(elevation) * distance,
     );
     this.camera.lookAt(x, y, z);
   }
-}
-
-/** Light from above and the side, so that the shadow of a mallet shows its height. */
-function sun(): DirectionalLight {
-  const light = new DirectionalLight(0xffffff, 1.7);
-  light.position.set(-0.8, -1.4, 3);
-  light.castShadow = true;
-  const { shadow } = light;
-  shadow.mapSize.set(1024, 1024);
-  shadow.camera.left = -2;
-  shadow.camera.right = 2;
-  shadow.camera.top = 1.5;
-  shadow.camera.bottom = -1.5;
-  shadow.camera.near = 1;
-  shadow.camera.far = 6;
-  shadow.normalBias = 0.01;
-  shadow.radius = 3;
-  return light;
 }
