@@ -1,7 +1,10 @@
 //! Outcomes and violations of episodes as text. A *violation* is a control step or more in which the robot exceeds a safety limit.
 
-use faceoff_replay::{Group, ViolationSummary};
-use faceoff_types::Competition;
+use faceoff_replay::{
+    Clip, ContactWith, EpisodeLine, Group, ViolationSummary,
+    model::{PUCK, TABLE},
+};
+use faceoff_types::{Competition, EpisodeEnd};
 
 pub(super) const fn group_label(group: Group) -> &'static str {
     match group {
@@ -41,6 +44,63 @@ pub(super) fn describe_violation(
             "steps"
         }
     )
+}
+
+/// Why an episode ended, as a plain sentence without numbers. The recorded description has the numbers.
+pub(super) fn plain_end(line: &EpisodeLine, motion: &Clip) -> String {
+    let task = line.task.to_string();
+    let end = line.end.to_string();
+    if line.end == EpisodeEnd::AGENT_FAULT {
+        return "A fault of the agent ended the episode.".to_owned();
+    }
+    let text = match (task.as_str(), end.as_str(), line.success) {
+        ("hit", _, true) => "Goal: the puck went into the opponent’s goal.",
+        ("hit", "left_table", false) if line.why.starts_with("no goal") => {
+            "No goal: the puck went in, but too slowly."
+        }
+        ("hit", "crossed_middle", false) => return came_back(motion),
+        ("hit", "horizon", false) => "No goal before the time was up.",
+        ("defend", _, true) => "Stopped: the puck came to rest where the agent can play it.",
+        ("defend", "crossed_middle", false) => {
+            "Not stopped: the puck was sent back across the middle."
+        }
+        ("defend", "stopped", false) => "The puck stopped, but in the wrong place.",
+        ("defend", "horizon", false) => "Not stopped before the time was up.",
+        ("prepare", _, true) => "Prepared: the puck is in a good hitting position.",
+        ("prepare", "crossed_middle", false) => "Lost: the puck crossed the middle line.",
+        ("prepare", "reached_axis", false) => {
+            "The puck reached the middle of the table, but not where it can be hit well."
+        }
+        ("prepare", "horizon", false) => {
+            "The puck was not in a good hitting position when the time was up."
+        }
+        (_, "left_table", false) if line.why.starts_with("own goal") => {
+            "Own goal: the puck went into the agent’s goal."
+        }
+        (_, "left_table", false) if line.why.starts_with("puck was lost") => {
+            "Lost: the puck was too fast for the simulation."
+        }
+        (_, "left_table", false) => "Lost: the puck left the table.",
+        (_, _, true) => "Success.",
+        (_, _, false) => "No success.",
+    };
+    text.to_owned()
+}
+
+/// Why a shot came back, from what the puck hit last in the opponent's half.
+fn came_back(motion: &Clip) -> String {
+    let beyond_middle = |contact: &&faceoff_replay::Contact| contact.x > 0.0;
+    let last = motion.header.contacts.iter().rfind(beyond_middle);
+    let cause = match last.map(|contact| (contact.what, contact.x)) {
+        Some((ContactWith::OpponentMallet, _)) => "the opponent returned it",
+        // The puck's centre stays one radius from the rim.
+        Some((ContactWith::Rim, x)) if x > TABLE.half_length_m() - 2.0 * PUCK.radius_m => {
+            "it hit the rim beside the goal and came back"
+        }
+        Some((ContactWith::Rim, _)) => "it hit the long side of the table and came back",
+        Some((ContactWith::Mallet, _)) | None => "it came back",
+    };
+    format!("Missed: {cause}.")
 }
 
 /// The largest excess; small values are never shown as zero.

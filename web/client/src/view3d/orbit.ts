@@ -1,16 +1,6 @@
 // The camera of the 3-D view, which moves on a sphere around a point of the table.
 
-import type { Camera } from "../replay/fragment";
-
-/** Camera position: the point x, y, z that it looks at, and its angles (rad) and distance (m) from there. */
-interface CameraPosition {
-  readonly x: number;
-  readonly y: number;
-  readonly z: number;
-  readonly azimuth: number;
-  readonly elevation: number;
-  readonly distance: number;
-}
+import type { Camera, CameraPosition } from "../replay/fragment";
 
 const RAD_PER_DEG = Math.PI / 180;
 
@@ -57,6 +47,12 @@ export class Orbit {
   preset(camera: Camera): void {
     this.camera = camera;
     this.animateTo(this.presetPosition(camera));
+  }
+
+  /** Moves the camera to a position of a link. */
+  restore(position: CameraPosition): void {
+    this.camera = null;
+    this.animateTo(this.turned(position, 0, 0, 1));
   }
 
   /** Widens the view for a second arm; moves the camera at once if it is at a preset. */

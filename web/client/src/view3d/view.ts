@@ -69,14 +69,16 @@ export class View3D implements View {
     );
   }
 
-  resize(width: number, height: number, ratio: number): void {
+  /** `coveredPx`: height at the bottom that controls cover; the table is drawn above it. */
+  resize(width: number, height: number, ratio: number, coveredPx = 0): void {
     if (width === 0 || height === 0) return;
     this.ratio = ratio;
     this.renderer.setPixelRatio(Math.min(ratio, this.quality.ratio));
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
-    this.distanceFactor = Math.max(REFERENCE_ASPECT / this.camera.aspect, 1);
+    this.camera.setViewOffset(width, height, 0, coveredPx / 2, width, height);
+    const visibleShare = (height - coveredPx) / height;
+    this.distanceFactor = Math.max(REFERENCE_ASPECT / this.camera.aspect, 1 / visibleShare);
   }
 
   paint(palette: Palette): void {
