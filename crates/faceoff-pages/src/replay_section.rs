@@ -43,7 +43,7 @@ impl ReplaySection {
             id: "replay",
             name,
             title,
-            outcome: plain_end(&episode.line, &episode.motion),
+            outcome: plain_end(&episode.line, &episode.motion.header.contacts),
             end_reason: episode.line.why.clone(),
             steps: episode.line.steps,
             still: Still::new(&episode.motion, episode.observations.as_ref()),

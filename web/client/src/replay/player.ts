@@ -97,8 +97,8 @@ export class Player {
     }); // prettier-ignore
     this.share = new ShareRow({
       link: () => location.href.replace(/#.*$/, "") + this.fragment(),
-      save: () => { void this.savePicture(); },
-      record: canRecord() ? () => { this.toggleRecording(); } : null,
+      save: () => { this.savePictures(); },
+      record: canRecord() && sections.length === 1 ? () => { this.toggleRecording(); } : null,
       help: () => { help.showModal(); },
       announce: this.announce,
     }); // prettier-ignore
@@ -377,25 +377,28 @@ export class Player {
     this.viewButton.setAttribute("aria-expanded", String(isOpen));
   }
 
-  private fileName(extension: string): string {
-    const title = this.options.sections[0].dataset.title ?? "replay";
+  private fileName(viewer: Viewer, extension: string): string {
+    const { title } = viewer;
     const slug = title.toLowerCase().replaceAll(/[^a-z0-9]+/g, "-").replaceAll(/^-|-$/g, ""); // prettier-ignore
     return `${slug || "replay"}-step-${this.step}.${extension}`;
   }
 
-  private async savePicture(): Promise<void> {
-    const [viewer] = this.viewers;
-    const frame = viewer.drawnFrame;
-    if (frame === null) return;
-    const canvas = document.createElement("canvas");
-    viewer.picture.drawForSaving(frame, (drawing) => {
-      Object.assign(canvas, captionedSize(drawing.width, drawing.height));
-      const context = canvas.getContext("2d");
-      if (context !== null) drawCaptioned(context, drawing, viewer.caption(), viewer.palette);
-    });
-    const picture = await new Promise<Blob | null>((resolve) => { canvas.toBlob(resolve, "image/png"); }); // prettier-ignore
-    if (picture === null) this.announce("The picture could not be saved");
-    else saveFile(picture, this.fileName("png"));
+  /** Saves a picture of each replay. */
+  private savePictures(): void {
+    for (const viewer of this.viewers) {
+      const frame = viewer.drawnFrame;
+      if (frame === null) continue;
+      const canvas = document.createElement("canvas");
+      viewer.picture.drawForSaving(frame, (drawing) => {
+        Object.assign(canvas, captionedSize(drawing.width, drawing.height));
+        const context = canvas.getContext("2d");
+        if (context !== null) drawCaptioned(context, drawing, viewer.caption(), viewer.palette);
+      });
+      canvas.toBlob((picture) => {
+        if (picture === null) this.announce("The picture could not be saved");
+        else saveFile(picture, this.fileName(viewer, "png"));
+      }, "image/png");
+    }
   }
 
   /** Starts a video at the current moment, or ends it and saves it. */
@@ -407,7 +410,7 @@ export class Player {
       clock.pause();
       this.share.showRecording(false);
       void video.stop().then((file) => {
-        saveFile(file, this.fileName("webm"));
+        saveFile(file, this.fileName(this.viewers[0], "webm"));
         this.announce("Video saved");
       });
       return;

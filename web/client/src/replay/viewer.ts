@@ -188,6 +188,11 @@ export class Viewer {
     }
   }
 
+  get title(): string {
+    return this.options.title;
+  }
+
+  /** How the replay ends, in words. */
   get motionEnd(): string {
     const motion = this.frame?.part.motion;
     return this.options.outcome ?? (motion === undefined ? "" : endText(motion));
