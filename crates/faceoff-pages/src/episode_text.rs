@@ -142,19 +142,15 @@ mod tests {
         let shot = hit(ContactWith::Mallet, -0.4);
         let end = "crossed_middle";
         assert_eq!(
-            failure("hit", end, &[shot.clone(), hit(ContactWith::Rim, 0.94)]),
+            failure("hit", end, &[shot, hit(ContactWith::Rim, 0.94)]),
             "Missed: it hit the rim beside the goal and came back."
         );
         assert_eq!(
-            failure("hit", end, &[shot.clone(), hit(ContactWith::Rim, 0.4)]),
+            failure("hit", end, &[shot, hit(ContactWith::Rim, 0.4)]),
             "Missed: it hit the long side of the table and came back."
         );
         assert_eq!(
-            failure(
-                "hit",
-                end,
-                &[shot.clone(), hit(ContactWith::OpponentMallet, 0.6)]
-            ),
+            failure("hit", end, &[shot, hit(ContactWith::OpponentMallet, 0.6)]),
             "Missed: the opponent returned it."
         );
         assert_eq!(failure("hit", end, &[shot]), "Missed: it came back.");

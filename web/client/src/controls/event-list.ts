@@ -12,7 +12,7 @@ const ROWS = 12;
 export class EventList {
   readonly element: HTMLElement;
   private readonly list = h("ol");
-  private readonly heading = h("h3", { class: "heading" }, "Events");
+  private readonly heading = h("h2", { class: "heading" }, "Events");
   private readonly whole = button("", () => { this.toggleWhole(); }); // prettier-ignore
   private rows: HTMLElement[] = [];
   private buttons: HTMLButtonElement[] = [];

@@ -35,7 +35,7 @@ export class StripCharts {
       h(
         "div",
         { class: "row" },
-        h("h3", { class: "heading" }, "Margins and times"),
+        h("h2", { class: "heading" }, "Margins and times"),
         this.span,
         this.choiceRow,
       ),
