@@ -72,20 +72,24 @@ export class Timeline {
     this.placeMarks();
   }
 
-  /** Draws the course of the score of a game that ends at step `last`. */
+  /** Shows the course of the score of a game that ends at step `last`. */
   showCourse(ends: readonly RallyEnd[], last: number): void {
-    const scores = ends.flatMap((end) =>
-      end.score === null ? [] : [{ sample: end.sample, score: end.score }],
-    );
+    const scores = ends.flatMap(({ sample, score }) => (score === null ? [] : [{ sample, score }]));
     const highest = Math.max(1, ...scores.flatMap(({ score }) => score));
-    const lines = ([0, 1] as const).map((side) => {
-      const steps = scores.map(({ sample, score }) => `H${sample}V${highest - score[side]}`).join("");
-      return { d: `M0 ${highest}${steps}H${last}`, class: `side-${side + 1}` };
-    });
-    const svg = drawing(`0 0 ${last} ${highest}`, lines);
-    svg.setAttribute("preserveAspectRatio", "none");
-    this.course.replaceChildren(svg);
     this.course.hidden = false;
+    // In pixels: a drawing that is stretched would have lines of different widths.
+    new ResizeObserver(() => {
+      const { clientWidth: width, clientHeight: height } = this.course;
+      if (width === 0) return;
+      const lines = ([0, 1] as const).map((side) => {
+        const steps = scores.map(({ sample, score }) => {
+          const y = height * (1 - score[side] / highest);
+          return `H${((sample / last) * width).toFixed(1)}V${y.toFixed(1)}`;
+        });
+        return { d: `M0 ${height}${steps.join("")}H${width}`, class: `side-${side + 1}` };
+      });
+      this.course.replaceChildren(drawing(`0 0 ${width} ${height}`, lines));
+    }).observe(this.course);
   }
 
   private placeMarks(): void {
