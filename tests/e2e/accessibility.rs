@@ -20,7 +20,7 @@ fn check_page(page: &Page, server: &Server, axe_script: &str, path: &str) -> Vec
     let has_heading = page.evaluate("document.querySelector('h1') !== null");
     assert_eq!(has_heading, true, "{path} has a heading");
     page.wait_until(
-        "[...document.querySelectorAll('.replay')].every(replay => replay.dataset.state == 'ready')",
+        "[...document.querySelectorAll('section.replay')].every(replay => replay.dataset.state == 'ready')",
     );
     faults(page, axe_script, path)
 }

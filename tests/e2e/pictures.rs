@@ -1,6 +1,6 @@
 //! Takes the pictures of pages for README and documentation: `make pictures`.
 
-use crate::{Team, evaluation_path, start_day};
+use crate::{Team, evaluation_path, replay::PREFERS_REDUCED_MOTION, start_day};
 use faceoff_replay::ContactWith;
 use faceoff_tests::{
     browser::{Browser, Page, View},
@@ -82,14 +82,17 @@ fn pictures_of_pages_are_taken() {
     // The address of a replay names its control step and its camera.
     let step = (strike.expect("a goal was struck").t / clip.header.step_s).ceil();
     let page = path.replace("/api/v1", "");
-    let replay = browser.open(&format!("{}{page}#t={step}&cam=corner", server.url));
+    let replay = browser.open(&format!("{}/", server.url));
+    // A link to a moment plays from there, except for visitors who prefer reduced motion.
+    replay.before_scripts(PREFERS_REDUCED_MOTION);
+    replay.go_to(&format!("{}{page}#t={step}&cam=corner", server.url));
     replay.wait_for("#replay[data-state=ready]");
     replay.wait_until(&format!(
         "document.querySelector('#replay').dataset.step == '{step}'"
     ));
     let view = View {
-        width: 1200,
-        height: 1290,
+        width: 1440,
+        height: 1100,
         ..View::DESKTOP
     };
     save_picture(&replay, view, "replay-page.png");

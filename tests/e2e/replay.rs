@@ -12,7 +12,7 @@ use faceoff_tests::{
     repository,
     server::Server,
 };
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::{io::Write, path::Path};
 
 /// Starts a server and waits for an evaluation whose results are public. Returns the server and the path of the evaluation's
@@ -56,6 +56,26 @@ fn press(page: &Page, name: &str) {
         }})()"
     ));
     assert_eq!(pressed, true, "there is a button {name:?}");
+}
+
+/// Runs before the scripts of a page: the visitor prefers reduced motion.
+pub const PREFERS_REDUCED_MOTION: &str = "
+    const original = window.matchMedia;
+    window.matchMedia = query => query.includes('prefers-reduced-motion')
+        ? { matches: true, addEventListener() {} }
+        : original.call(window, query);
+";
+
+/// Whether the replay plays after an action, which is an expression.
+fn plays_after(page: &Page, action: &str) -> bool {
+    let label = page.evaluate(&format!(
+        "(() => {{
+            {action};
+            return new Promise(drawn => requestAnimationFrame(() => requestAnimationFrame(() =>
+                drawn(document.querySelector('#replay .transport .main').getAttribute('aria-label')))));
+        }})()"
+    ));
+    label == "Pause"
 }
 
 /// The pixels with the puck's colour in the flat view: x and y of their centre, and their number.
@@ -172,10 +192,6 @@ fn replay_shows_recorded_positions_in_3d_and_flat_view() {
     }
     assert_eq!(page.console_errors(), [""; 0]);
 
-    // A link can name a sample and a view.
-    let linked = browser.open(&format!("{}{path}#t=7&flat=1", server.url));
-    linked.wait_for("#replay[data-state=ready][data-view=flat]");
-    linked.wait_until("document.querySelector('#replay').dataset.step == '7'");
     // No page is wider than its window.
     for view in [View::PHONE, View::PHONE.dark(), View::DESKTOP.dark()] {
         for path in [path.clone(), format!("{path}/embed")] {
@@ -197,6 +213,132 @@ fn replay_shows_recorded_positions_in_3d_and_flat_view() {
         .map_or(0, |curve| curve.matches(['M', 'L']).count());
     assert_eq!(points, positions.len());
     assert_eq!(page_without_scripts.overflow(), 0);
+}
+
+#[test]
+fn picture_and_its_controls_fit_the_window() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let (server, evaluation) = released_evaluation(scratch.path());
+    let browser = Browser::start(scratch.path());
+    let url = format!("{}{evaluation}/episodes/defend/0", server.url);
+    for (width, height) in [(1440, 900), (1280, 640), (768, 1024), (390, 844)] {
+        let view = View {
+            width,
+            height,
+            ..View::DESKTOP
+        };
+        let page = browser.open_in(view, &url);
+        page.wait_for("#replay[data-state=ready]");
+        let found = page.evaluate(
+            "(() => {
+                document.querySelector('#replay .stage').scrollIntoView();
+                const box = selector => document.querySelector(selector).getBoundingClientRect();
+                const [screen, controls, details] = ['.screen', '.controls', '.details'].map(box);
+                return {
+                    fits: screen.top >= 0 && screen.bottom <= innerHeight && screen.right <= innerWidth,
+                    controls: controls.bottom <= screen.bottom + 1 && controls.top >= screen.top,
+                    beside: details.left >= screen.right,
+                };
+            })()",
+        );
+        let expected = json!({ "fits": true, "controls": true, "beside": width >= 1200 });
+        assert_eq!(found, expected, "{width} x {height}");
+        assert_eq!(page.overflow(), 0, "{width} x {height}");
+    }
+    let frame = View {
+        width: 640,
+        height: 360,
+        ..View::DESKTOP
+    };
+    let page = browser.open_in(frame, &format!("{url}/embed"));
+    page.wait_for("#replay[data-state=ready]");
+    let height = page.evaluate("document.documentElement.scrollHeight");
+    assert_eq!(height, 360, "an embedded replay does not scroll");
+    let picture_height = page.evaluate(
+        "document.querySelector('.controls').getBoundingClientRect().top >= 180
+            && document.querySelector('.controls').getBoundingClientRect().bottom <= innerHeight",
+    );
+    assert_eq!(picture_height, true);
+}
+
+#[test]
+fn space_and_clicks_play_and_drags_do_not() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let (server, evaluation) = released_evaluation(scratch.path());
+    let browser = Browser::start(scratch.path());
+    let page = browser.open(&format!("{}{evaluation}/episodes/defend/0", server.url));
+    page.wait_for("#replay[data-state=ready]");
+    let _ = page.evaluate(
+        "(() => {
+            const speed = document.querySelector('#replay select[aria-label=Speed]');
+            speed.value = '0.1';
+            speed.dispatchEvent(new Event('change'));
+            window.space = target => target.dispatchEvent(
+                new KeyboardEvent('keydown', { key: ' ', bubbles: true, cancelable: true }));
+            const area = document.querySelector('#replay .canvas-area');
+            const at = (kind, x) => area.dispatchEvent(
+                new PointerEvent(kind, { clientX: x, clientY: 300, button: 0, bubbles: true }));
+            window.clickPicture = moved => { at('pointerdown', 300); at('pointermove', 300 + moved);
+                at('pointerup', 300 + moved); area.click(); };
+        })()",
+    );
+    assert!(plays_after(&page, "space(document.body)"));
+    assert!(!plays_after(&page, "space(document.querySelector('h1'))"));
+    assert!(!plays_after(
+        &page,
+        "space(document.querySelector('.lead a'))"
+    ));
+    assert!(!plays_after(
+        &page,
+        "space(document.querySelector('#replay select'))"
+    ));
+    assert!(plays_after(&page, "clickPicture(2)"));
+    assert!(
+        plays_after(&page, "clickPicture(60)"),
+        "a drag turns the camera"
+    );
+    assert!(!plays_after(&page, "clickPicture(0)"));
+    assert_eq!(page.console_errors(), [""; 0]);
+}
+
+#[test]
+fn link_to_a_moment_restores_the_view_and_plays() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let (server, evaluation) = released_evaluation(scratch.path());
+    let browser = Browser::start(scratch.path());
+    let url = format!("{}{evaluation}/episodes/hit/0", server.url);
+    let linked = browser.open(&format!("{url}#t=7&flat=1"));
+    linked.wait_for("#replay[data-state=ready][data-view=flat]");
+    linked.wait_until("Number(document.querySelector('#replay').dataset.step) > 7");
+
+    let page = browser.open(&format!("{}/", server.url));
+    page.before_scripts(PREFERS_REDUCED_MOTION);
+    let fragment = "#t=9&cam=-0.1_0_0.05_-1.3_0.6_3.1&speed=2&paths=puck&trail=all&arm=2";
+    page.go_to(&format!("{url}{fragment}"));
+    page.wait_for("#replay[data-state=ready][data-step='9']");
+    let found = page.evaluate(
+        "(() => {
+            Object.defineProperty(navigator, 'clipboard', { value: undefined });
+            [...document.querySelectorAll('#replay button')]
+                .find(button => button.textContent == 'Copy link to this moment').click();
+            return new Promise(done => setTimeout(() => done({
+                link: document.querySelector('#replay .address').value,
+                speed: document.querySelector('#replay select[aria-label=Speed]').value,
+                layers: document.querySelectorAll('#replay .layers input:checked').length,
+                arm: document.querySelector('#replay .strips select').selectedIndex,
+                playing: document.querySelector('#replay .transport .main').getAttribute('aria-label'),
+                isInView: document.querySelector('#replay .screen').getBoundingClientRect().top < innerHeight / 2,
+            })));
+        })()",
+    );
+    let expected = json!({
+        "link": format!("{url}{fragment}"), "speed": "2", "layers": 1, "arm": 1, "playing": "Play", "isInView": true,
+    });
+    assert_eq!(found, expected);
+    // Bad values are ignored.
+    page.go_to(&format!("{url}?#t=x&cam=1_2&paths=moon&arm=7"));
+    page.wait_for("#replay[data-state=ready][data-step='0']");
+    assert_eq!(page.console_errors(), [""; 0]);
 }
 
 #[test]
@@ -245,14 +387,31 @@ fn compared_replays_show_same_sample() {
     page.wait_until("document.querySelectorAll('.replay[data-state=ready]').length == 2");
     let _ = page.evaluate(
         "(() => {
-            const slider = document.querySelector('#replay-a input[type=range]');
+            const slider = document.querySelector('.shared-controls input[type=range]');
             slider.value = 12;
             slider.dispatchEvent(new Event('input', { bubbles: true }));
         })()",
     );
     page.wait_until(
-        "[...document.querySelectorAll('.replay')].every(replay => replay.dataset.step == '12')",
+        "[...document.querySelectorAll('section.replay')].every(replay => replay.dataset.step == '12')",
     );
+    // On a phone both pictures and their only controls are in view at once.
+    page.set_view(View {
+        width: 390,
+        height: 844,
+        ..View::DESKTOP
+    });
+    let visible = page.evaluate(
+        "new Promise(done => requestAnimationFrame(() => {
+            document.querySelector('.together').scrollIntoView();
+            const boxes = ['#replay-a .screen', '#replay-b .screen', '.shared-controls .controls']
+                .map(selector => document.querySelector(selector).getBoundingClientRect());
+            done([document.querySelectorAll('input[type=range]').length,
+                boxes.every(box => box.top >= 0 && box.bottom <= innerHeight && box.height > 50)]);
+        }))",
+    );
+    assert_eq!(visible, json!([1, true]));
+    page.set_view(View::DESKTOP);
     // axe-core finds violations of accessibility rules.
     let axe = axe_script();
     let mut found = faults(&page, &axe, "an episode twice");

@@ -97,7 +97,7 @@ fn round_pages_update_live_and_can_hide_results() {
         page.set_view(View::DESKTOP);
         page.go_to(&format!("{}{path}", server.url));
         page.wait_until(
-            "[...document.querySelectorAll('.replay')].every(replay => replay.dataset.state == 'ready')",
+            "[...document.querySelectorAll('section.replay')].every(replay => replay.dataset.state == 'ready')",
         );
         found.extend(faults(page, &axe, &path));
     }

@@ -1,7 +1,10 @@
 //! Outcomes and violations of episodes as text. A *violation* is a control step or more in which the robot exceeds a safety limit.
 
-use faceoff_replay::{Group, ViolationSummary};
-use faceoff_types::Competition;
+use faceoff_replay::{
+    Contact, ContactWith, EpisodeLine, Group, ViolationSummary,
+    model::{PUCK, TABLE},
+};
+use faceoff_types::{Competition, EpisodeEnd};
 
 pub(super) const fn group_label(group: Group) -> &'static str {
     match group {
@@ -43,6 +46,62 @@ pub(super) fn describe_violation(
     )
 }
 
+/// Why an episode ended, as a plain sentence without numbers. The recorded description has the numbers.
+pub(super) fn plain_end(line: &EpisodeLine, contacts: &[Contact]) -> String {
+    let task = line.task.to_string();
+    let end = line.end.to_string();
+    if line.end == EpisodeEnd::AGENT_FAULT {
+        return "A fault of the agent ended the episode.".to_owned();
+    }
+    let text = match (task.as_str(), end.as_str(), line.success) {
+        ("hit", _, true) => "Goal: the puck went into the opponent’s goal.",
+        ("hit", "left_table", false) if line.why.starts_with("no goal") => {
+            "No goal: the puck went in, but too slowly."
+        }
+        ("hit", "crossed_middle", false) => return came_back(contacts),
+        ("hit", "horizon", false) => "No goal before the time was up.",
+        ("defend", _, true) => "Stopped: the puck came to rest where the agent can play it.",
+        ("defend", "crossed_middle", false) => {
+            "Not stopped: the puck was sent back across the middle."
+        }
+        ("defend", "stopped", false) => "The puck stopped, but in the wrong place.",
+        ("defend", "horizon", false) => "Not stopped before the time was up.",
+        ("prepare", _, true) => "Prepared: the puck is in a good hitting position.",
+        ("prepare", "crossed_middle", false) => "Lost: the puck crossed the middle line.",
+        ("prepare", "reached_axis", false) => {
+            "The puck reached the middle of the table, but not where it can be hit well."
+        }
+        ("prepare", "horizon", false) => {
+            "The puck was not in a good hitting position when the time was up."
+        }
+        (_, "left_table", false) if line.why.starts_with("own goal") => {
+            "Own goal: the puck went into the agent’s goal."
+        }
+        (_, "left_table", false) if line.why.starts_with("puck was lost") => {
+            "Lost: the puck was too fast for the simulation."
+        }
+        (_, "left_table", false) => "Lost: the puck left the table.",
+        (_, _, true) => "Success.",
+        (_, _, false) => "No success.",
+    };
+    text.to_owned()
+}
+
+/// Why a shot came back, from what the puck hit last in the opponent's half.
+fn came_back(contacts: &[Contact]) -> String {
+    let last = contacts.iter().rfind(|contact| contact.x > 0.0);
+    let cause = match last.map(|contact| (contact.what, contact.x)) {
+        Some((ContactWith::OpponentMallet, _)) => "the opponent returned it",
+        // The puck's centre stays one radius from the rim.
+        Some((ContactWith::Rim, x)) if x > TABLE.half_length_m() - 2.0 * PUCK.radius_m => {
+            "it hit the rim beside the goal and came back"
+        }
+        Some((ContactWith::Rim, _)) => "it hit the long side of the table and came back",
+        Some((ContactWith::Mallet, _)) | None => "it came back",
+    };
+    format!("Missed: {cause}.")
+}
+
 /// The largest excess; small values are never shown as zero.
 fn excess_text(worst: f64, decimals: usize, unit: &str) -> String {
     let text = format!("{worst:.decimals$}");
@@ -63,5 +122,49 @@ mod tests {
         assert_eq!(excess_text(0.0004, 3, "rad/s"), "less than 0.001 rad/s");
         assert_eq!(excess_text(0.0006, 3, "rad/s"), "up to 0.001 rad/s");
         assert_eq!(excess_text(12.34, 1, "mm"), "up to 12.3 mm");
+    }
+    /// The plain reason of an episode that did not succeed.
+    fn failure(task: &str, end: &str, contacts: &[Contact]) -> String {
+        let line = serde_json::json!({
+            "task": task, "episode": 0, "steps": 90, "success": false, "end": end, "why": "puck at x = 0.31 m",
+        });
+        plain_end(&serde_json::from_value(line).unwrap(), contacts)
+    }
+
+    #[test]
+    fn missed_shot_names_what_it_hit_last() {
+        let hit = |what, x| Contact {
+            t: 1.0,
+            what,
+            x,
+            y: 0.2,
+        };
+        let shot = hit(ContactWith::Mallet, -0.4);
+        let end = "crossed_middle";
+        assert_eq!(
+            failure("hit", end, &[shot, hit(ContactWith::Rim, 0.94)]),
+            "Missed: it hit the rim beside the goal and came back."
+        );
+        assert_eq!(
+            failure("hit", end, &[shot, hit(ContactWith::Rim, 0.4)]),
+            "Missed: it hit the long side of the table and came back."
+        );
+        assert_eq!(
+            failure("hit", end, &[shot, hit(ContactWith::OpponentMallet, 0.6)]),
+            "Missed: the opponent returned it."
+        );
+        assert_eq!(failure("hit", end, &[shot]), "Missed: it came back.");
+    }
+
+    #[test]
+    fn plain_reason_has_no_numbers() {
+        for (task, end) in [
+            ("hit", "horizon"),
+            ("defend", "stopped"),
+            ("prepare", "left_table"),
+        ] {
+            let text = failure(task, end, &[]);
+            assert!(!text.contains(|c: char| c.is_ascii_digit()), "{text}");
+        }
     }
 }

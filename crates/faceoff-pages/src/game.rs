@@ -2,6 +2,7 @@
 
 mod analysis;
 mod live;
+mod replay;
 mod score_timeline;
 
 use super::{
@@ -25,22 +26,16 @@ use faceoff_service::{
     viewer::Viewer,
     views::{game, game_clips::GameClips, live_game::LiveGameView},
 };
-use faceoff_types::{GameId, Side, SubmissionId, TeamId, TournamentId};
+use faceoff_types::{GameId, SubmissionId, TeamId, TournamentId};
 use live::LiveGame;
+use replay::GameReplay;
+pub(super) use replay::embedded;
 use score_timeline::ScoreTimeline;
 
 /// A row of the table of statistics.
 struct Statistic {
     name: &'static str,
     sides: [String; 2],
-}
-
-/// Addresses of the game's clips (recordings of motion and observations), of which the script loads one chunk after another.
-struct ReplayChunks {
-    motion: String,
-    observed: Option<String>,
-    /// Control steps of the game, plus one.
-    samples: u32,
 }
 
 /// A result that is not hidden.
@@ -87,7 +82,7 @@ struct Page {
     has_result: bool,
     result: Option<GameResult>,
     sections: Option<GameSections>,
-    replay: Option<ReplayChunks>,
+    replay: Option<GameReplay>,
     table: TableOutline,
     styles: [&'static str; 2],
     script: &'static str,
@@ -134,15 +129,16 @@ pub(super) async fn page(
                 true => full_game_steps(&app, view.tournament).await?,
                 false => result.steps,
             };
+            let analysis = match &clips {
+                Some(clips) if !is_hidden => Some(clips.analysis(&app, result.steps).await?),
+                _ => None,
+            };
             replay = clips
                 .as_ref()
-                .map(|clips| ReplayChunks::new(id, clips, steps));
+                .map(|clips| GameReplay::new(&view, clips, steps, analysis.as_deref()));
             if !is_hidden {
                 shown_result = Some(GameResult::new(result));
-                if let Some(clips) = &clips {
-                    let analysis = clips.analysis(&app, result.steps).await?;
-                    sections = Some(GameSections::new(&analysis, &teams));
-                }
+                sections = analysis.map(|analysis| GameSections::new(&analysis, &teams));
             }
         }
         _ => {}
@@ -176,21 +172,6 @@ pub(super) async fn page(
 /// Control steps of a full game of the tournament.
 async fn full_game_steps(app: &App, tournament: TournamentId) -> Result<u32, Problem> {
     Ok(app.store.tournament(tournament).await?.rules.steps)
-}
-
-impl ReplayChunks {
-    fn new(id: GameId, clips: &GameClips, steps: u32) -> Self {
-        let api = paths::game(id);
-        let visible_side = Side::BOTH
-            .into_iter()
-            .find(|side| clips.can_see_observations[side.index()]);
-        Self {
-            motion: format!("{api}/motion/{{chunk}}"),
-            observed: visible_side
-                .map(|side| format!("{api}/sides/{}/observed/{{chunk}}", side.number())),
-            samples: steps.saturating_add(1),
-        }
-    }
 }
 
 impl GameSections {

@@ -101,6 +101,7 @@ pub fn router(time_limit: Duration, api: Arc<Value>) -> Router<App> {
             get(replay::embedded),
         )
         .route("/games/{id}", get(game::page))
+        .route("/games/{id}/embed", get(game::embedded))
         .route("/tournaments", get(tournaments::page))
         .route("/tournaments/{id}", get(tournament::page))
         .route("/tournaments/{id}/teams/{a}/{b}", get(head_to_head::page))

@@ -5,6 +5,7 @@ use super::{
     episode_text::describe_violation,
     frame::{Frame, PageProblem, render},
     replay_section::ReplaySection,
+    side_by_side::neighbours,
 };
 use crate::embeddable::Embeddable;
 use askama::Template;
@@ -27,14 +28,25 @@ struct EpisodeReplay {
     episode: u32,
     team: String,
     day: Date,
+    /// What the agent has to achieve in the task.
+    aim: String,
     success: bool,
-    end_reason: String,
     violations: Vec<String>,
     late_answers: u32,
     duration_s: String,
     replay: ReplaySection,
     script: &'static str,
     styles: [&'static str; 2],
+    previous: Option<String>,
+    next: Option<String>,
+    failed: FailedEpisodes,
+}
+
+/// The failed episodes of the task in this evaluation.
+struct FailedEpisodes {
+    count: usize,
+    /// The place of this episode among them, from 1; `None` if it was a success.
+    place: Option<usize>,
     previous: Option<String>,
     next: Option<String>,
 }
@@ -103,8 +115,11 @@ impl EpisodeReplay {
             episode,
             team: team.name.to_string(),
             day,
+            aim: competition
+                .task(task)
+                .map(|info| info.aim.clone())
+                .unwrap_or_default(),
             success: line.success,
-            end_reason: line.why.clone(),
             violations: line
                 .broken
                 .iter()
@@ -122,6 +137,28 @@ impl EpisodeReplay {
             styles: [assets::EPISODES_STYLE.url(), assets::REPLAY_STYLE.url()],
             previous: clip.has_previous.then(|| page_path(id, task, episode - 1)),
             next: clip.has_next.then(|| page_path(id, task, episode + 1)),
+            failed: FailedEpisodes::load(&clips, path).await?,
+        })
+    }
+}
+
+impl FailedEpisodes {
+    async fn load(clips: &Clips, path: EpisodePath) -> Result<Self, Problem> {
+        let EpisodePath { id, task, episode } = path;
+        let lines = clips.episodes().await?.episodes.into_iter();
+        let failed: Vec<u32> = lines
+            .filter(|line| line.task == task && !line.success && line.has_clips())
+            .map(|line| line.episode)
+            .collect();
+        let [previous, next] = neighbours(failed.iter().copied(), episode)
+            .map(|other| other.map(|other| page_path(id, task, other)));
+        Ok(Self {
+            count: failed.len(),
+            place: failed
+                .contains(&episode)
+                .then(|| failed.iter().filter(|other| **other <= episode).count()),
+            previous,
+            next,
         })
     }
 }

@@ -1,7 +1,10 @@
 //! A replay on a page: a still picture, and the addresses from which the script loads the *clips*, the recorded motion and observations
 //! of an episode.
 
-use super::table_drawing::{self, Dot, TableOutline};
+use super::{
+    episode_text::plain_end,
+    table_drawing::{self, Dot, TableOutline},
+};
 use faceoff_replay::{
     Clip,
     model::{PUCK, TOOL},
@@ -16,7 +19,9 @@ pub(super) struct ReplaySection {
     pub(super) name: String,
     /// Base name of saved pictures and files.
     pub(super) title: String,
-    /// Why the episode ended.
+    /// Why the episode ended, as a plain sentence.
+    pub(super) outcome: String,
+    /// Why the episode ended, with the numbers behind it.
     pub(super) end_reason: String,
     /// Control steps of the episode.
     pub(super) steps: u32,
@@ -38,6 +43,7 @@ impl ReplaySection {
             id: "replay",
             name,
             title,
+            outcome: plain_end(&episode.line, &episode.motion.header.contacts),
             end_reason: episode.line.why.clone(),
             steps: episode.line.steps,
             still: Still::new(&episode.motion, episode.observations.as_ref()),

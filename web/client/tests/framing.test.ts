@@ -2,7 +2,8 @@
 
 import { describe, expect, it } from "vitest";
 import { CAMERAS } from "../src/replay/fragment";
-import { cameraAxes, dot, fieldOf, fit, type CameraPosition, type Point3 } from "../src/view3d/framing";
+import type { CameraPosition } from "../src/replay/fragment";
+import { cameraAxes, dot, fieldOf, fit, type Point3 } from "../src/view3d/framing";
 import { Orbit } from "../src/view3d/orbit";
 import { pinchOf } from "../src/view3d/pointer";
 import { cameraPosition, followedPoint, pointsOf } from "../src/view3d/scenes";

@@ -3,12 +3,13 @@
 import { describe, expect, it } from "vitest";
 import { decodeMotion } from "../src/clip/motion";
 import { decodeObserved } from "../src/clip/observed";
-import { fixed, stepText } from "../src/controls/format";
+import { fixed, stepText, timeText } from "../src/controls/format";
 import { actionFor, type KeyActions } from "../src/controls/keys";
 import { Clock } from "../src/replay/clock";
 import { columnName, csvOf } from "../src/replay/csv";
-import { endText, eventsOf } from "../src/replay/events";
-import { parseFragment, writeFragment } from "../src/replay/fragment";
+import { courseEvents, courseScore, parseCourse } from "../src/replay/course";
+import { endText, eventsOf, scoreText } from "../src/replay/events";
+import { parseFragment, writeFragment, type LinkTarget } from "../src/replay/fragment";
 import { Score } from "../src/replay/score";
 import { Source } from "../src/replay/source";
 import { encode, stillArmColumns } from "./encoder";
@@ -100,9 +101,33 @@ describe("a link to a moment", () => {
     expect(parseFragment("#t=37&flat=1")).toEqual({ step: 37, flat: true });
   });
 
-  it("ignores unknown fields", () => {
+  it("holds a turned camera, the layers, the arm and the kinds of events", () => {
+    const target: LinkTarget & { step: number } = {
+      step: 5,
+      camera: { x: -0.27, y: 0, z: 0.08, azimuth: -1.234, elevation: 0.5, distance: 3.25 },
+      layers: { puck: true, mallet: false, commanded: true, seen: false, wholePart: true },
+      arm: 1,
+      hiddenKinds: ["contact", "late"],
+    };
+    const fragment = writeFragment(target);
+    expect(fragment).toBe(
+      "#t=5&cam=-0.27_0_0.08_-1.234_0.5_3.25&paths=puck_commanded&trail=all&arm=2&hide=contact_late",
+    );
+    expect(parseFragment(fragment)).toEqual(target);
+    const nothing = { puck: false, mallet: false, commanded: false, seen: false, wholePart: false };
+    expect(parseFragment(writeFragment({ step: 0, layers: nothing, hiddenKinds: [] }))).toEqual({
+      step: 0,
+      layers: nothing,
+      hiddenKinds: [],
+    });
+  });
+
+  it("ignores unknown fields and bad values", () => {
     expect(parseFragment("#main")).toEqual({});
     expect(parseFragment("#t=-1&cam=moon&speed=3&x=%")).toEqual({});
+    expect(parseFragment("#t=1e9&cam=1_2_3&paths=puck_moon&arm=3&flat=2&trail=x&hide=end")).toEqual({});
+    expect(parseFragment("#cam=9_0_0_0_0_1")).toEqual({});
+    expect(parseFragment("#t=Infinity&cam=0_0_0_0_NaN_1&speed=")).toEqual({});
   });
 });
 
@@ -122,7 +147,7 @@ const motion = encode(
 
 describe("events", () => {
   it("are in order of time, with consecutive late answers merged", () => {
-    const events = eventsOf(decodeMotion(motion), decodeObserved(observed));
+    const events = eventsOf(decodeMotion(motion), decodeObserved(observed), ["Alpha", "Beta"]);
     expect(events.map((event) => [event.position, event.text])).toEqual([
       [1, "end effector out of bounds, step 1, by 3.1 mm"],
       [1, "camera lost the puck for 3 steps"],
@@ -157,6 +182,35 @@ describe("the score of a game", () => {
     expect(score.at(1500)).toEqual([1, 1]);
     score.addChunk(80, [], [4, 2]);
     expect(score.at(40_200)).toEqual([4, 2]);
+  });
+});
+
+describe("the course of a game", () => {
+  const names = ["striker", "keeper"] as const;
+  const course = parseCourse(
+    '{"ends":[[100,"goal",0,1,0],[900,"foul",1,1,0],[1200,"goal",1,1,1]],"violations":[[50,90,1,"ee joint_vel",3]]}',
+  );
+
+  it("gives events with the names of the sides, and the score", () => {
+    if (course === null) throw new Error("the course is valid");
+    expect(courseEvents(course, names).map(({ kind, position, text }) => [kind, position, text])).toEqual([
+      [
+        "violation",
+        50,
+        "keeper: end effector out of bounds, joint velocity beyond 95 % of its limit (3 times)",
+      ],
+      ["goal", 100, "goal by striker, 1 : 0"],
+      ["foul", 900, "foul by keeper, 1 : 0"],
+      ["goal", 1200, "goal by keeper, 1 : 1"],
+    ]);
+    expect([100, 101, 1200, 1201].map((position) => scoreText(courseScore(course, position), names))).toEqual(
+      ["striker 0 : 0 keeper", "striker 1 : 0 keeper", "striker 1 : 0 keeper", "striker 1 : 1 keeper"],
+    );
+  });
+
+  it("is unknown if the page does not have it as expected", () => {
+    for (const text of [undefined, "", "null", '{"ends":[]}', '{"ends":[[1,"goal",2,0,0]],"violations":[]}'])
+      expect(parseCourse(text)).toBeNull();
   });
 });
 
@@ -225,7 +279,15 @@ describe("keys", () => {
     expect(actionFor("ArrowLeft", false, "slider", actions)).toBeNull();
     expect(actionFor("ArrowLeft", true, "slider", actions)).not.toBeNull();
     expect(actionFor("n", false, "other", actions)).toBeNull();
+    expect(actionFor(" ", false, "other", actions)).toBeNull();
     expect(actionFor("Tab", false, "picture", actions)).toBeNull();
+  });
+
+  it("are left to the page outside the replay, except for the space key", () => {
+    expect(actionFor(" ", false, "page", actions)).toBe(actions.toggle);
+    expect(actionFor(" ", true, "page", actions)).toBeNull();
+    for (const key of ["n", "f", "1", "ArrowLeft", "Home", "?"])
+      expect(actionFor(key, false, "page", actions)).toBeNull();
   });
 });
 
@@ -233,6 +295,18 @@ describe("number formats", () => {
   it("use a true minus, and no sign for zero", () => {
     expect(fixed(-0.0004, 2)).toBe("0.00");
     expect(fixed(-1.5, 1)).toBe("−1.5");
-    expect(stepText(37, 120, 0.02)).toBe("step 37 of 120, 0.74 s");
+    expect(stepText(37, 120, { stepS: STEP_S, hasMinutes: false })).toBe("step 37 of 120, 0.74 s");
+  });
+
+  it("write times of games in minutes and seconds", () => {
+    const game = { stepS: STEP_S, hasMinutes: true };
+    expect([0, 49, 50, 22_400, 45_000].map((step) => timeText(step, game))).toEqual([
+      "0:00",
+      "0:00",
+      "0:01",
+      "7:28",
+      "15:00",
+    ]);
+    expect(stepText(22_400, 45_000, game)).toBe("7:28 of 15:00");
   });
 });

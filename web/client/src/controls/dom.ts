@@ -25,15 +25,23 @@ export function h<K extends keyof HTMLElementTagNameMap>(
 
 const SVG = "http://www.w3.org/2000/svg";
 
-/** An icon of 16 × 16 from one path. The control has an accessible name in any case. */
-export function icon(path: string): SVGSVGElement {
+/** An SVG drawing of paths, hidden from screen readers: what it shows has a text in any case. */
+export function drawing(viewBox: string, paths: readonly { d: string; class?: string }[]): SVGSVGElement {
   const svg = document.createElementNS(SVG, "svg");
-  svg.setAttribute("viewBox", "0 0 16 16");
+  svg.setAttribute("viewBox", viewBox);
   svg.setAttribute("aria-hidden", "true");
-  const shape = document.createElementNS(SVG, "path");
-  shape.setAttribute("d", path);
-  svg.append(shape);
+  for (const path of paths) {
+    const shape = document.createElementNS(SVG, "path");
+    shape.setAttribute("d", path.d);
+    if (path.class !== undefined) shape.setAttribute("class", path.class);
+    svg.append(shape);
+  }
   return svg;
+}
+
+/** An icon of 16 × 16 from one path. */
+export function icon(path: string): SVGSVGElement {
+  return drawing("0 0 16 16", [{ d: path }]);
 }
 
 /** A button with the accessible name `name`. With an icon, the name is shown as tooltip only. */

@@ -12,17 +12,21 @@ export interface KeyActions {
   readonly help: () => void;
 }
 
+/** Where the focus is: on a control of the replay, elsewhere on the page, or where keys have another meaning. */
+export type Focus = "picture" | "slider" | "button" | "page" | "other";
+
 /**
- * The action of a key; null without one. `focus`: the focused control. Keys that the control itself needs are left to it:
- * arrows of a slider, space of a button, all keys of a text field.
+ * The action of a key; null without one. Keys that the focused control itself needs are left to it: arrows of a slider, space of
+ * a button, all keys of a text field. Elsewhere on the page only the space key is a shortcut: the others belong to the browser.
  */
 export function actionFor(
   key: string,
   shift: boolean,
-  focus: "picture" | "slider" | "button" | "other",
+  focus: Focus,
   actions: KeyActions,
 ): (() => void) | null {
   if (focus === "other") return null;
+  if (focus === "page") return key === " " && !shift ? actions.toggle : null;
   const camera = CAMERAS[Number(key) - 1] as Camera | undefined;
   if (camera !== undefined) return () => { actions.camera(camera); }; // prettier-ignore
   const stepAction = (count: number): (() => void) => () => { actions.step(count); }; // prettier-ignore
@@ -55,23 +59,29 @@ export function actionFor(
   }
 }
 
-/** Listens inside the viewer only: elsewhere on the page the keys belong to the browser. */
-export function listenForKeys(element: HTMLElement, actions: KeyActions): void {
-  element.addEventListener("keydown", (event) => {
+/** Listens to the keys of a page. `isInside`: does an element belong to the replay? */
+export function listenForKeys(isInside: (element: Element) => boolean, actions: KeyActions): void {
+  document.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || event.defaultPrevented) return;
-    const action = actionFor(event.key, event.shiftKey, focusOf(event.target), actions);
+    const { target } = event;
+    if (!(target instanceof Element)) return;
+    const action = actionFor(event.key, event.shiftKey, focusOf(target, isInside(target)), actions);
     if (action === null) return;
     event.preventDefault();
+    // A held key does not switch again and again.
+    if (event.repeat && event.key === " ") return;
     action();
   });
 }
 
-function focusOf(target: EventTarget | null): "picture" | "slider" | "button" | "other" {
-  if (!(target instanceof HTMLElement)) return "other";
+function focusOf(target: Element, isInside: boolean): Focus {
   if (target.closest("dialog") !== null) return "other";
   if (target instanceof HTMLInputElement) {
+    if (!isInside) return "other";
     return target.type === "range" ? "slider" : target.type === "checkbox" ? "button" : "other";
   }
-  if (target.closest("button, summary, a") !== null) return "button";
-  return target.classList.contains("canvas-area") ? "picture" : "other";
+  if (target.closest("select, textarea, video, audio, iframe, [contenteditable]") !== null) return "other";
+  if (target.closest("button, summary, a, label, [role=button]") !== null)
+    return isInside ? "button" : "other";
+  return isInside && target.classList.contains("canvas-area") ? "picture" : "page";
 }

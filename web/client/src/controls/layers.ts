@@ -4,7 +4,7 @@ import type { Layers } from "../replay/frame-state";
 import { h } from "./dom";
 
 interface Choice {
-  readonly layer: Exclude<keyof Layers, "whole">;
+  readonly layer: Exclude<keyof Layers, "wholePart">;
   readonly name: string;
   /** CSS class of a line sample in the style of the picture. */
   readonly sample: string;
@@ -21,9 +21,14 @@ const CHOICES: readonly Choice[] = [
 export class LayerChoice {
   readonly element: HTMLElement;
   private readonly rows = new Map<keyof Layers, HTMLElement>();
+  private readonly boxes = new Map<Choice["layer"], HTMLInputElement>();
+  private readonly trail = h("select", {}, h("option", {}, "last second"), h("option", {}, "everything"));
 
-  constructor(layers: Layers, changed: () => void) {
-    const boxes = CHOICES.map(({ layer, name, sample }) => {
+  constructor(
+    private readonly layers: Layers,
+    private readonly changed: () => void,
+  ) {
+    const rows = CHOICES.map(({ layer, name, sample }) => {
       const box = h("input", { attributes: { type: "checkbox" } });
       box.checked = layers[layer];
       box.addEventListener("change", () => {
@@ -32,20 +37,27 @@ export class LayerChoice {
       });
       const row = h("label", {}, box, h("span", { class: `line-sample ${sample}` }), name);
       this.rows.set(layer, row);
+      this.boxes.set(layer, box);
       return row;
     });
-    const trailChoice = h("select", {}, h("option", {}, "last second"), h("option", {}, "everything"));
-    trailChoice.selectedIndex = layers.wholePart ? 1 : 0;
-    trailChoice.addEventListener("change", () => {
-      layers.wholePart = trailChoice.selectedIndex === 1;
+    this.trail.addEventListener("change", () => {
+      layers.wholePart = this.trail.selectedIndex === 1;
       changed();
     });
     this.element = h(
       "div",
       { class: "row layers", attributes: { role: "group", "aria-label": "Paths" } },
-      ...boxes,
-      h("label", {}, "Trail: ", trailChoice),
+      ...rows,
+      h("label", {}, "Trail: ", this.trail),
     );
+  }
+
+  /** Shows the layers of a link. */
+  set(layers: Layers): void {
+    Object.assign(this.layers, layers);
+    for (const [layer, box] of this.boxes) box.checked = layers[layer];
+    this.trail.selectedIndex = layers.wholePart ? 1 : 0;
+    this.changed();
   }
 
   /** Hides choices without data. */

@@ -1,4 +1,4 @@
-// Buttons to share a replay: link, picture, full screen; and help.
+// Buttons to share a replay: link, picture, video; and help.
 
 import { button, h } from "./dom";
 import { ICONS } from "./icons";
@@ -7,45 +7,64 @@ interface Actions {
   /** Address of the current moment and view. */
   readonly link: () => string;
   readonly save: () => void;
+  /** Starts or stops recording a video; null if the browser cannot. */
+  readonly record: (() => void) | null;
   readonly help: () => void;
   readonly announce: (text: string) => void;
 }
 
-/** Buttons for link, picture, full screen and help. `full`: element shown in full screen. */
-export function shareRow(full: HTMLElement, actions: Actions): HTMLElement {
-  const address = h("input", {
-    class: "address",
-    attributes: { readonly: "", "aria-label": "Link to this moment", hidden: "" },
-  });
-  const copy = button("Copy link to this moment", () => {
-    const link = actions.link();
-    copyText(link).then(
-      () => {
-        actions.announce("Link copied");
-        flash(copy, "Link copied");
-      },
-      () => {
-        // Without access to the clipboard the visitor copies the link manually.
-        address.hidden = false;
-        address.value = link;
-        address.select();
-        actions.announce("Copy the link from the field beside the button");
-      },
+/** The row of buttons below the picture. */
+export class ShareRow {
+  readonly element: HTMLElement;
+  private readonly video: HTMLButtonElement | null;
+
+  constructor(actions: Actions) {
+    const address = h("input", {
+      class: "address",
+      attributes: { readonly: "", "aria-label": "Link to this moment", hidden: "" },
+    });
+    const copy = button("Copy link to this moment", () => {
+      const link = actions.link();
+      copyText(link).then(
+        () => {
+          actions.announce("Link copied");
+          flash(copy, "Link copied");
+        },
+        () => {
+          // Without access to the clipboard the visitor copies the link manually.
+          address.hidden = false;
+          address.value = link;
+          address.select();
+          actions.announce("Copy the link from the field beside the button");
+        },
+      );
+    });
+    this.video = actions.record === null ? null : button("", actions.record);
+    this.showRecording(false);
+    this.element = h(
+      "div",
+      { class: "row share" },
+      copy,
+      address,
+      button("Save picture", actions.save),
+      this.video,
+      button("Keys", actions.help),
     );
-  });
-  const row = h("div", { class: "row share" }, copy, address, button("Save picture", actions.save));
-  if (document.fullscreenEnabled) {
-    const screen = button("Full screen", () => {
-      void (document.fullscreenElement === null ? full.requestFullscreen() : document.exitFullscreen());
-    }, ICONS.full); // prettier-ignore
-    row.append(screen);
   }
-  const help = button("?", actions.help);
-  help.setAttribute("aria-label", "Keys");
-  help.title = "Keys";
-  help.classList.add("icon-button");
-  row.append(help);
-  return row;
+
+  showRecording(isRecording: boolean): void {
+    if (this.video === null) return;
+    this.video.textContent = isRecording ? "Stop and save video" : "Record video";
+    this.video.setAttribute("aria-pressed", String(isRecording));
+  }
+}
+
+/** A button that shows an element in full screen; null if the browser cannot. */
+export function fullScreenButton(full: () => HTMLElement): HTMLButtonElement | null {
+  if (!document.fullscreenEnabled) return null;
+  return button("Full screen", () => {
+    void (document.fullscreenElement === null ? full().requestFullscreen() : document.exitFullscreen());
+  }, ICONS.full); // prettier-ignore
 }
 
 /** Copies a text to the clipboard. */

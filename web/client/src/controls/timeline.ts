@@ -1,12 +1,13 @@
 // The timeline: a slider for the time, with a mark for each event.
 
+import type { RallyEnd } from "../clip/motion";
 import type { Clock } from "../replay/clock";
 import type { ReplayEvent } from "../replay/events";
-import { h, setText } from "./dom";
-import { seconds, stepText } from "./format";
+import { drawing, h, setText } from "./dom";
+import { stepText, timeText, type TimeFormat } from "./format";
 
-/** Largest number of marks; more would overlap. The list has all events. */
-const MAX_MARKS = 300;
+/** Largest number of marks of one kind that are buttons; more would overlap, so they are bars. The list has all events. */
+const MAX_BUTTONS_OF_KIND = 60;
 
 /** The slider with a mark per event above it. */
 export class Timeline {
@@ -22,11 +23,14 @@ export class Timeline {
   private readonly tooltip = h("span", { class: "tooltip", attributes: { hidden: "" } });
   private events: readonly ReplayEvent[] = [];
   private buttons: HTMLButtonElement[] = [];
+  /** The score of each side over the time of a game. */
+  private readonly course = h("div", { class: "course-lines", attributes: { hidden: "" } });
   private last = -1;
   private step = -1;
 
   constructor(
     clock: Clock,
+    private readonly format: TimeFormat,
     private readonly seekToEvent: (event: ReplayEvent) => void,
     title: string,
   ) {
@@ -47,45 +51,70 @@ export class Timeline {
       next.tabIndex = 0;
       next.focus();
     });
-    this.element = h("div", { class: "timeline" }, this.marks, this.slider);
+    this.element = h("div", { class: "timeline" }, this.course, this.marks, this.slider);
   }
 
-  update(step: number, last: number, stepS: number): void {
+  update(step: number, last: number): void {
     if (last !== this.last) {
       this.last = last;
       this.slider.max = String(last);
-      this.placeMarks(stepS);
+      this.placeMarks();
     }
     if (step !== this.step) {
       this.step = step;
       this.slider.value = String(step);
-      this.slider.setAttribute("aria-valuetext", stepText(step, last, stepS));
+      this.slider.setAttribute("aria-valuetext", stepText(step, last, this.format));
     }
   }
 
-  show(events: readonly ReplayEvent[], stepS: number): void {
+  show(events: readonly ReplayEvent[]): void {
     this.events = events;
-    this.placeMarks(stepS);
+    this.placeMarks();
   }
 
-  private placeMarks(stepS: number): void {
+  /** Shows the course of the score of a game that ends at step `last`. */
+  showCourse(ends: readonly RallyEnd[], last: number): void {
+    const scores = ends.flatMap(({ sample, score }) => (score === null ? [] : [{ sample, score }]));
+    const highest = Math.max(1, ...scores.flatMap(({ score }) => score));
+    this.course.hidden = false;
+    // In pixels: a drawing that is stretched would have lines of different widths.
+    new ResizeObserver(() => {
+      const { clientWidth: width, clientHeight: height } = this.course;
+      if (width === 0) return;
+      const lines = ([0, 1] as const).map((side) => {
+        const steps = scores.map(({ sample, score }) => {
+          const y = height * (1 - score[side] / highest);
+          return `H${((sample / last) * width).toFixed(1)}V${y.toFixed(1)}`;
+        });
+        return { d: `M0 ${height}${steps.join("")}H${width}`, class: `side-${side + 1}` };
+      });
+      this.course.replaceChildren(drawing(`0 0 ${width} ${height}`, lines));
+    }).observe(this.course);
+  }
+
+  private placeMarks(): void {
     if (this.last <= 0) return;
     const share = (position: number): string =>
       `${(100 * Math.min(Math.max(position / this.last, 0), 1)).toFixed(3)}%`;
+    const numbers = new Map<string, number>();
+    for (const { kind } of this.events) numbers.set(kind, (numbers.get(kind) ?? 0) + 1);
     const spans: HTMLElement[] = [];
     this.buttons = [];
-    for (const event of this.events.slice(0, MAX_MARKS)) {
-      if (event.endPosition > event.position) {
+    for (const event of this.events) {
+      const isBar = (numbers.get(event.kind) ?? 0) > MAX_BUTTONS_OF_KIND;
+      if (isBar || event.endPosition > event.position) {
         const span = h("span", { class: `span ${event.kind}` });
         span.style.left = share(event.position);
         span.style.width = share(event.endPosition - event.position);
         spans.push(span);
       }
-      const label = `${seconds(event.position, stepS)}: ${event.text}`;
+      if (isBar) continue;
+      const label = `${timeText(event.position, this.format)}: ${event.text}`;
+      const side = event.side === null ? "" : ` side-${event.side + 1}`;
       const mark = h(
         "button",
         {
-          class: `mark ${event.kind}`,
+          class: `mark ${event.kind}${side}`,
           attributes: { type: "button", tabindex: this.buttons.length === 0 ? "0" : "-1", "aria-label": label },
           on: {
             click: () => {
@@ -103,7 +132,7 @@ export class Timeline {
       this.buttons.push(mark);
     }
     this.marks.replaceChildren(...spans, ...this.buttons, this.tooltip);
-    this.marks.hidden = this.buttons.length === 0;
+    this.marks.hidden = this.buttons.length + spans.length === 0;
   }
 
   /** Shows the tip above its mark, inside the width of the picture. */

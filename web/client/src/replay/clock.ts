@@ -1,7 +1,7 @@
 // The clock of a replay: position, speed and playback.
 
 /** Offered speeds, as multiples of real time. */
-export const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4] as const;
+export const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8, 16] as const;
 
 /** A source of animation frames. */
 export interface Ticker {

@@ -1,10 +1,14 @@
 // Events of a replay as text: contacts, violations, ends of rallies, lost observations and late answers.
 
-import type { ConstraintGroup, Motion, Violation } from "../clip/motion";
+import type { ConstraintGroup, Motion, RallyEnd, Violation } from "../clip/motion";
 import type { Observed } from "../clip/observed";
 import { fixed } from "../controls/format";
+import type { SwitchedKind } from "./fragment";
 
-export type EventKind = "contact" | "violation" | "rally" | "lost" | "late" | "end";
+export type EventKind = SwitchedKind | "end";
+
+/** Names of both sides of a game. */
+export type SideNames = readonly [string, string];
 
 /** An event for the timeline and the list. */
 export interface ReplayEvent {
@@ -15,11 +19,15 @@ export interface ReplayEvent {
   readonly endPosition: number;
   readonly text: string;
   readonly symbol: string;
+  /** The side of a game to which the event belongs; null without one. */
+  readonly side: 0 | 1 | null;
 }
 
 const SYMBOLS: Record<EventKind, string> = {
   contact: "•",
   violation: "▲",
+  goal: "●",
+  foul: "◇",
   rally: "◆",
   lost: "○",
   late: "◷",
@@ -37,8 +45,8 @@ export const CONSTRAINT_NAMES: Record<ConstraintGroup, { name: string; unit: str
 /** What the puck hit, as text. */
 const CONTACT_NAMES = { rim: "the rim", mallet: "the mallet", opponent_mallet: "the opponent's mallet" };
 
-/** All events of a part in order of time. */
-export function eventsOf(motion: Motion, observed: Observed | null): ReplayEvent[] {
+/** All events of a part in order of time. `names`: of the sides of a game. */
+export function eventsOf(motion: Motion, observed: Observed | null, names: SideNames): ReplayEvent[] {
   const isGame = motion.contest === "game";
   const events: ReplayEvent[] = [];
   const add = (
@@ -46,33 +54,34 @@ export function eventsOf(motion: Motion, observed: Observed | null): ReplayEvent
     position: number,
     until: number,
     text: string,
+    side: 0 | 1 | null = null,
     symbol = SYMBOLS[kind],
   ): void => {
-    events.push({ kind, position, endPosition: until, text, symbol });
+    events.push({ kind, position, endPosition: until, text, symbol, side });
   };
 
   for (const contact of motion.contacts) {
     const position = contact.t / motion.stepS;
+    const side = contact.what === "opponent_mallet" ? 1 : 0;
     const struckName =
-      isGame && contact.what !== "rim"
-        ? `mallet ${contact.what === "mallet" ? "A" : "B"}`
-        : CONTACT_NAMES[contact.what];
+      isGame && contact.what !== "rim" ? `the mallet of ${names[side]}` : CONTACT_NAMES[contact.what];
     add(
       "contact",
       position,
       position,
       `puck hits ${struckName} at (${fixed(contact.x, 2)}, ${fixed(contact.y, 2)}) m`,
+      isGame && contact.what !== "rim" ? side : null,
     );
   }
   for (const violation of motion.violations) {
     const prefix =
       motion.arms.length > 1 && (isGame || violation.side === 1)
-        ? `${sideName(motion, violation.side)}: `
+        ? `${sideName(motion, violation.side, names)}: `
         : "";
-    add("violation", violation.from, violation.to, prefix + violationText(violation));
+    const side = isGame ? violation.side : null;
+    add("violation", violation.from, violation.to, prefix + violationText(violation), side);
   }
-  for (const end of motion.breaks)
-    add("rally", end.sample, end.sample, rallyText(end.what, end.by, end.score));
+  for (const end of motion.breaks) events.push(rallyEvent(end, names));
   for (const lost of observed?.lost ?? []) {
     add("lost", lost.from, lost.to, `camera lost the puck for ${lost.to - lost.from + 1} steps`);
   }
@@ -85,9 +94,18 @@ export function eventsOf(motion: Motion, observed: Observed | null): ReplayEvent
   }
   if (motion.end !== null) {
     const { success, steps } = motion.end;
-    add("end", steps, steps, endText(motion), success === null ? SYMBOLS.end : success ? "✓" : "✕");
+    const symbol = success === null ? SYMBOLS.end : success ? "✓" : "✕";
+    add("end", steps, steps, endText(motion), null, symbol);
   }
   return events.sort((a, b) => a.position - b.position);
+}
+
+/** The end of a rally as an event. */
+export function rallyEvent(end: RallyEnd, names: SideNames): ReplayEvent {
+  const { what, by, sample, score } = end;
+  const kind = what === "goal" || what === "foul" ? what : "rally";
+  const text = rallyText(what, by, score, names);
+  return { kind, position: sample, endPosition: sample, text, symbol: SYMBOLS[kind], side: by };
 }
 
 /** How the episode or game ended. */
@@ -99,9 +117,14 @@ export function endText(motion: Motion): string {
   return `${end.success ? "Success" : "No success"}: ${why}`;
 }
 
-export function sideName(motion: Motion, side: 0 | 1): string {
-  if (motion.contest === "game") return side === 0 ? "A" : "B";
+export function sideName(motion: Motion, side: 0 | 1, names: SideNames): string {
+  if (motion.contest === "game") return names[side];
   return side === 0 ? "robot" : "opponent";
+}
+
+/** The score of a game with the names of its sides: `striker 9 : 0 keeper`. */
+export function scoreText(score: readonly [number, number], names: SideNames): string {
+  return `${names[0]} ${score[0]} : ${score[1]} ${names[1]}`;
 }
 
 function violationText(violation: Violation): string {
@@ -111,8 +134,13 @@ function violationText(violation: Violation): string {
   return `${name}, ${span}, by ${fixed(violation.worst * scale, unit === "mm" ? 1 : 3)} ${unit}`;
 }
 
-function rallyText(what: string, by: 0 | 1 | null, score: readonly [number, number] | null): string {
-  const side = by === null ? "" : ` by ${by === 0 ? "A" : "B"}`;
+function rallyText(
+  what: string,
+  by: 0 | 1 | null,
+  score: readonly [number, number] | null,
+  names: SideNames,
+): string {
+  const side = by === null ? "" : ` by ${names[by]}`;
   const texts: Record<string, string> = {
     goal: `goal${side}`,
     foul: `foul${side}`,
@@ -120,8 +148,8 @@ function rallyText(what: string, by: 0 | 1 | null, score: readonly [number, numb
     left_table: "puck left the table",
     diverged: `simulation diverged${side}`,
   };
-  const scoreText = score === null ? "" : `, ${score[0]} : ${score[1]}`;
-  return (texts[what] ?? what.replaceAll("_", " ") + side) + scoreText;
+  const shownScore = score === null ? "" : `, ${score[0]} : ${score[1]}`;
+  return (texts[what] ?? what.replaceAll("_", " ") + side) + shownScore;
 }
 
 /** Merges consecutive numbers into ranges, first and last number inclusive. */

@@ -3,9 +3,38 @@
 import { h, setText } from "../controls/dom";
 import { FlatView } from "../flat/view";
 import { View3D } from "../view3d/view";
-import type { Camera } from "./fragment";
+import type { SideNames } from "./events";
+import type { Camera, CameraPosition } from "./fragment";
 import type { Palette } from "./palette";
 import type { FrameState, View } from "./frame-state";
+
+/** A pointer that moves farther than this between press and release has dragged, not clicked. */
+const MAX_CLICK_PX = 5;
+
+/** Device pixels per CSS pixel of a saved picture. */
+const SAVED_RATIO = 2;
+
+/** Texts on the picture; empty texts are hidden. */
+export interface PictureTexts {
+  readonly state: string;
+  readonly outcome: string;
+  readonly good: boolean;
+  /** Score of a game. */
+  readonly score: readonly [number, number] | null;
+}
+
+interface PictureOptions {
+  readonly title: string;
+  /** Sides of a game, for the score. */
+  readonly names: SideNames;
+  readonly prefersReducedMotion: boolean;
+  /** Called when the picture must be redrawn. */
+  readonly changed: () => void;
+  /** Called after a change of the view. */
+  readonly switched: () => void;
+  /** Called after a click that was no drag. */
+  readonly clicked: () => void;
+}
 
 /** The picture, in 3-D or flat, with texts on it. */
 export class Picture {
@@ -18,27 +47,31 @@ export class Picture {
   private readonly note = h("p", { class: "picture-note", attributes: { hidden: "" } });
   private readonly state = h("p", { class: "picture-state", attributes: { hidden: "" } });
   private readonly outcome = h("p", { class: "picture-outcome", attributes: { hidden: "" } });
-  private readonly score = h("p", { class: "picture-score", attributes: { hidden: "" } });
+  private readonly points = h("span", { class: "points" });
+  private readonly score: HTMLElement;
   private wantsFlat = false;
   private ratio = 1;
+  private coveredPx = 0;
 
-  /** `changed`: called when the picture must be redrawn; `switched`: called after a change of the view. */
-  constructor(
-    title: string,
-    prefersReducedMotion: boolean,
-    changed: () => void,
-    private readonly switched: () => void,
-  ) {
-    this.view3d = this.openView3d(prefersReducedMotion, changed);
+  constructor(private readonly options: PictureOptions) {
+    this.view3d = this.openView3d();
     this.canvasArea = h(
       "div",
       {
         class: "canvas-area",
-        attributes: { tabindex: "0", role: "group", "aria-label": `Picture: ${title}` },
+        attributes: { tabindex: "0", role: "group", "aria-label": `Picture: ${options.title}` },
       },
       this.flatView.canvas,
     );
     if (this.view3d !== null) this.canvasArea.prepend(this.view3d.canvas);
+    const [home, away] = options.names;
+    this.score = h(
+      "p",
+      { class: "picture-score", attributes: { hidden: "" } },
+      h("span", { class: "side side-1" }, home),
+      this.points,
+      h("span", { class: "side side-2" }, away),
+    );
     this.element = h(
       "div",
       { class: "picture" },
@@ -50,9 +83,10 @@ export class Picture {
     );
     for (const canvas of this.canvasArea.querySelectorAll("canvas"))
       canvas.setAttribute("aria-hidden", "true");
+    this.listenForClicks();
     new ResizeObserver(() => {
       this.resize();
-      changed();
+      options.changed();
     }).observe(this.canvasArea);
     this.updateShownView();
   }
@@ -66,8 +100,25 @@ export class Picture {
     this.updateShownView();
   }
 
-  setCamera(camera: Camera): void {
-    this.view3d?.orbit.preset(camera);
+  /** The camera: a preset, or a position after manual turning; null without 3-D. */
+  get camera(): Camera | CameraPosition | null {
+    if (this.view3d === null) return null;
+    const { camera, x, y, z, azimuth, elevation, distance } = this.view3d.orbit;
+    return camera ?? { x, y, z, azimuth, elevation, distance };
+  }
+
+  setCamera(camera: Camera | CameraPosition): void {
+    if (typeof camera === "string") this.view3d?.orbit.preset(camera);
+    else this.view3d?.orbit.restore(camera);
+  }
+
+  /** Controls cover the bottom of the picture: the table is drawn above them. */
+  setCovered(heightPx: number): void {
+    if (heightPx === this.coveredPx) return;
+    this.coveredPx = heightPx;
+    this.element.style.setProperty("--covered", `${heightPx}px`);
+    this.resize();
+    this.options.changed();
   }
 
   paint(palette: Palette): void {
@@ -79,29 +130,42 @@ export class Picture {
     return this.view().draw(frame);
   }
 
-  /** Sets the texts on the picture; empty texts are hidden. */
-  setTexts(texts: { state: string; outcome: string; good: boolean; score: string }): void {
+  setTexts(texts: PictureTexts): void {
     showText(this.state, texts.state);
-    showText(this.score, texts.score);
     showText(this.outcome, texts.outcome);
     this.outcome.classList.toggle("good", texts.good);
+    if (texts.score !== null) setText(this.points, `${texts.score[0]} : ${texts.score[1]}`);
+    this.score.hidden = texts.score === null;
   }
 
-  /** The current picture as PNG. */
-  toPng(frame: FrameState): Promise<Blob | null> {
+  /** The drawing of the last frame. WebGL keeps it only until the end of the task. */
+  get canvas(): HTMLCanvasElement {
+    return this.view().canvas;
+  }
+
+  /** Draws with the resolution of saved pictures, calls `use` with the drawing, and returns to the resolution of the screen. */
+  drawForSaving(frame: FrameState, use: (drawing: HTMLCanvasElement) => void): void {
     const view = this.view();
-    // WebGL keeps the drawing only until the browser has shown it: draw and read in the same task.
+    const { clientWidth: width, clientHeight: height } = this.canvasArea;
+    if (view === this.flatView) {
+      view.resize(width, height, SAVED_RATIO);
+    } else {
+      // On a slow machine the 3-D view has fewer pixels per unit of its size: a larger size makes up for it.
+      const size = (SAVED_RATIO * width) / Math.max(view.canvas.width, 1);
+      view.resize(width * size, height * size, this.ratio);
+    }
     view.draw(frame);
-    return new Promise((resolve) => {
-      view.canvas.toBlob(resolve, "image/png");
-    });
+    use(view.canvas);
+    this.resize();
+    view.draw(frame);
   }
 
   private view(): View {
     return this.isFlat || this.view3d === null ? this.flatView : this.view3d;
   }
 
-  private openView3d(prefersReducedMotion: boolean, changed: () => void): View3D | null {
+  private openView3d(): View3D | null {
+    const { prefersReducedMotion, changed } = this.options;
     try {
       const view = new View3D(prefersReducedMotion, changed);
       view.canvas.addEventListener("webglcontextlost", (event) => {
@@ -120,19 +184,39 @@ export class Picture {
     }
   }
 
+  private listenForClicks(): void {
+    let start: { x: number; y: number } | null = null;
+    let farthestPx = 0;
+    const follow = (event: PointerEvent): void => {
+      if (start === null) return;
+      farthestPx = Math.max(farthestPx, Math.hypot(event.clientX - start.x, event.clientY - start.y));
+    };
+    this.canvasArea.addEventListener("pointerdown", (event) => {
+      start = { x: event.clientX, y: event.clientY };
+      farthestPx = 0;
+    });
+    this.canvasArea.addEventListener("pointermove", follow);
+    this.canvasArea.addEventListener("pointerup", follow);
+    this.canvasArea.addEventListener("click", () => {
+      const isClick = farthestPx <= MAX_CLICK_PX;
+      start = null;
+      if (isClick) this.options.clicked();
+    });
+  }
+
   private updateShownView(): void {
     this.flatView.canvas.hidden = !this.isFlat;
     if (this.view3d !== null) this.view3d.canvas.hidden = this.isFlat;
     this.element.classList.toggle("flat", this.isFlat);
     showText(this.note, this.unavailable ?? "");
-    this.switched();
+    this.options.switched();
   }
 
   private resize(): void {
     const { clientWidth, clientHeight } = this.canvasArea;
     this.ratio = Math.min(devicePixelRatio, 2);
-    this.flatView.resize(clientWidth, clientHeight, this.ratio);
-    this.view3d?.resize(clientWidth, clientHeight, this.ratio);
+    this.flatView.resize(clientWidth, Math.max(clientHeight - this.coveredPx, 1), this.ratio);
+    this.view3d?.resize(clientWidth, clientHeight, this.ratio, this.coveredPx);
   }
 }
 

@@ -66,10 +66,11 @@ export class Source {
     return this.loadOnce(this.indexOf(position));
   }
 
-  /** Starts to fetch the part after this position. A failure is reported when the part is needed. */
-  prefetch(position: number): void {
-    const next = this.indexOf(position) + 1;
-    if (next < this.chunkCount) this.loadOnce(next).catch(() => undefined);
+  /** Starts to fetch the parts after this position, `count` of them. A failure is reported when the part is needed. */
+  prefetch(position: number, count: number): void {
+    const current = this.indexOf(position);
+    for (let next = current + 1; next <= current + count && next < this.chunkCount; next++)
+      this.loadOnce(next).catch(() => undefined);
   }
 
   private async loadOnce(index: number): Promise<ReplayPart> {

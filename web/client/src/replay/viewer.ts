@@ -1,31 +1,29 @@
-// The viewer: one replay on a page with all its controls.
+// The viewer: one replay on a page with its picture, and data synchronised with it. Its controls are those of a player.
 
-import { Cameras } from "../controls/cameras";
-import { DataTable, fileName, saveFile } from "../controls/data";
+import { DataTable } from "../controls/data";
 import { button, h, setText } from "../controls/dom";
 import { EventList } from "../controls/event-list";
-import { helpDialog } from "../controls/help";
-import { listenForKeys } from "../controls/keys";
-import { LayerChoice } from "../controls/layers";
-import { shareRow } from "../controls/share";
-import { Timeline } from "../controls/timeline";
-import { Transport } from "../controls/transport";
 import { fixed } from "../controls/format";
 import { Kinematics } from "../model/kinematics";
 import { newPose } from "../motion/pose";
 import { StripCharts } from "../strips/strips";
+import type { Caption } from "./caption";
 import type { Clock } from "./clock";
-import { endText, eventsOf, type ReplayEvent } from "./events";
-import { parseFragment, writeFragment, type Camera } from "./fragment";
-import type { FrameLoop } from "./loop";
-import { paletteOf } from "./palette";
-import { Score } from "./score";
+import { courseEvents, courseScore, type Course } from "./course";
+import { endText, eventsOf, scoreText, type ReplayEvent, type SideNames } from "./events";
 import type { Layers, FrameState } from "./frame-state";
-import { errorText, type ReplayPart, type Source } from "./source";
+import type { FrameLoop } from "./loop";
+import { paletteOf, type Palette } from "./palette";
 import { Picture } from "./picture";
+import { Score } from "./score";
+import { errorText, type ReplayPart, type Source } from "./source";
+import { timeText, type TimeFormat } from "../controls/format";
 
 /** Update interval of the data table during playback. */
 const TABLE_UPDATE_MS = 200;
+
+/** Parts that are fetched ahead, at most: at 16 × a part of a game lasts less than a second. */
+const MAX_AHEAD = 3;
 
 /** What a viewer needs from its page. */
 export interface ViewerOptions {
@@ -34,129 +32,108 @@ export interface ViewerOptions {
   readonly source: Source;
   /** Steps of a game; null for an episode, whose clip contains the number. */
   readonly steps: number | null;
+  /** Sides of a game. */
+  readonly names: SideNames;
+  /** Why the episode ended, in plain words; null if the page does not know it. */
+  readonly outcome: string | null;
+  /** The course of a whole game; null if the page does not know it. */
+  readonly course: Course | null;
   readonly clock: Clock;
   readonly loop: FrameLoop;
+  readonly layers: Layers;
+  readonly format: TimeFormat;
   /** The visitor prefers reduced motion: no camera animations. */
   readonly prefersReducedMotion: boolean;
 }
 
-/** One replay on a page: the picture, its controls, and data synchronised with it. */
+/** What a viewer reports to its player. */
+export interface ViewerEvents {
+  readonly announce: (text: string) => void;
+  readonly clicked: () => void;
+  readonly viewSwitched: () => void;
+  /** Events of another part are known. */
+  readonly eventsChanged: () => void;
+  /** A part is shown: paths that it does not have cannot be chosen. */
+  readonly partShown: (part: ReplayPart) => void;
+  /** A frame was drawn; the drawing can be read until the end of the task. */
+  readonly drawn: () => void;
+}
+
+/** One replay on a page. */
 export class Viewer {
-  private readonly element = h("div", { class: "viewer" });
-  private readonly statusLine = h("p", { class: "sr", attributes: { role: "status" } });
+  readonly element = h("div", { class: "viewer" });
+  /** The picture, and the controls on it. */
+  readonly screen: HTMLElement;
+  /** What full screen shows. */
+  readonly stage: HTMLElement;
+  /** Events, charts and data. */
+  readonly details = h("div", { class: "details" });
+  readonly picture: Picture;
+  readonly strips: StripCharts;
+  /** Last step of this replay. */
+  last = 0;
   private readonly currentValues = h("p", { class: "current-values" });
   private readonly problem = h("div", { class: "problem", attributes: { role: "alert", hidden: "" } });
-  private readonly layers: Layers = {
-    seen: true,
-    mallet: true,
-    commanded: true,
-    puck: true,
-    wholePart: false,
-  };
-  private readonly events = new Map<number, readonly ReplayEvent[]>();
+  private readonly partEvents = new Map<number, readonly ReplayEvent[]>();
+  private readonly courseEvents: readonly ReplayEvent[];
   private readonly score = new Score();
-  private readonly picture: Picture;
-  private readonly transport: Transport;
-  private readonly timeline: Timeline;
-  private readonly cameras: Cameras;
-  private readonly layerChoice: LayerChoice;
-  private readonly strips: StripCharts;
   private readonly eventList: EventList;
   private readonly dataTable: DataTable;
+  private listedEvents: readonly ReplayEvent[] | null = null;
   private frame: FrameState | null = null;
-  private lastStep = 0;
   private isDrawRequested = false;
   private loadingIndex: number | null = null;
-  private wasPlaying = false;
   private tableUpdatedMs = 0;
   private step = -1;
 
-  constructor(private readonly options: ViewerOptions) {
-    const { clock, title, section } = options;
-    this.picture = new Picture(title, options.prefersReducedMotion, this.invalidate, () => {
-      this.viewSwitched();
-    });
-    const seekToEvent = (event: ReplayEvent): void => {
+  constructor(
+    private readonly options: ViewerOptions,
+    private readonly events: ViewerEvents,
+  ) {
+    const { clock, title, section, names } = options;
+    this.courseEvents = options.course === null ? [] : courseEvents(options.course, names);
+    this.picture = new Picture({
+      title,
+      names,
+      prefersReducedMotion: options.prefersReducedMotion,
+      changed: this.invalidate,
+      switched: () => { this.viewSwitched(); },
+      clicked: events.clicked,
+    }); // prettier-ignore
+    const seek = (position: number): void => {
       clock.pause();
-      clock.seek(event.position);
+      clock.seek(position);
     };
-    this.transport = new Transport(clock, { event: this.toEvent });
-    this.timeline = new Timeline(clock, seekToEvent, title);
-    this.cameras = new Cameras({
-      preset: this.toCamera,
-      orbit: (right, up) => this.picture.view3d?.orbit.turn(right, up),
-      zoom: (steps) => this.picture.view3d?.orbit.zoom(steps),
-      flat: (flat) => {
-        this.picture.setFlat(flat);
-      },
-    });
-    this.layerChoice = new LayerChoice(this.layers, this.invalidate);
-    this.strips = new StripCharts((sample) => {
-      clock.pause();
-      clock.seek(sample);
-    });
-    this.eventList = new EventList(seekToEvent);
+    this.strips = new StripCharts(names, seek);
+    this.eventList = new EventList((event) => { seek(event.position); }); // prettier-ignore
     this.dataTable = new DataTable(title);
-    const help = helpDialog();
-    const share = shareRow(this.element, {
-      link: () => location.href.replace(/#.*$/, "") + this.fragment(),
-      save: () => void this.save(),
-      help: () => { help.showModal(); },
-      announce: (text) => { this.announce(text); },
-    }); // prettier-ignore
-    const embedded = section.dataset.embed !== undefined;
-    this.element.append(
-      h(
-        "div",
-        { class: "screen" },
-        this.picture.element,
-        this.timeline.element,
-        this.transport.element,
-        this.cameras.element,
-      ),
-      this.problem,
-      this.statusLine,
-      help,
-    );
-    if (!embedded) {
-      this.element.append(
-        this.currentValues,
-        this.layerChoice.element,
-        share,
-        this.strips.element,
-        this.eventList.element,
-        this.dataTable.element,
-      );
+    this.screen = h("div", { class: "screen" }, this.picture.element);
+    this.stage = h("div", { class: "stage" }, this.screen, this.problem);
+    this.element.append(this.stage);
+    if (section.dataset.embed === undefined) {
+      this.stage.append(this.currentValues);
+      this.details.append(this.eventList.element, this.strips.element, this.dataTable.element);
+      this.element.append(this.details);
     }
-    listenForKeys(this.element, {
-      toggle: () => { clock.toggle(); },
-      step: (by) => { clock.step(by); },
-      event: this.toEvent,
-      camera: this.toCamera,
-      flat: () => { this.picture.setFlat(!this.picture.isFlat); },
-      help: () => { help.showModal(); },
-    }); // prettier-ignore
     clock.addListener(this.invalidate);
     clock.addGate((position) => this.ensureLoaded(position));
   }
 
-  /** Loads the first part and replaces the still picture. */
-  async open(): Promise<void> {
+  /** Loads the part at a position and replaces the still picture. False if that failed. */
+  async open(position: number): Promise<boolean> {
     const { section, clock, source, steps } = this.options;
     section.dataset.state = "loading";
-    section.classList.add("replay");
     const waiting = h("p", { class: "waiting", attributes: { role: "status" } }, "Loading the replay …");
     this.insertBelowStill(waiting);
-    const target = parseFragment(location.hash);
     try {
-      const part = await source.partAt(target.step ?? 0);
+      const part = await source.partAt(position);
       waiting.remove();
-      this.lastStep = steps ?? part.motion.samples - 1;
+      this.last = steps ?? part.motion.samples - 1;
       this.mount();
-      clock.extendTo(this.lastStep);
+      clock.extendTo(this.last);
       this.addPart(part);
       this.show(part);
-      this.applyFragment();
+      return true;
     } catch (error) {
       waiting.remove();
       section.dataset.state = "failed";
@@ -165,12 +142,92 @@ export class Viewer {
         h("p", {}, `The replay could not be loaded: ${errorText(error)}.`),
         button("Try again", () => {
           failure.remove();
-          void this.open();
+          void this.open(position);
         }),
       );
       this.insertBelowStill(failure);
+      return false;
     }
   }
+
+  /** Events of the whole game, and of the loaded parts. */
+  allEvents(): ReplayEvent[] {
+    const loaded = [...this.partEvents.entries()].sort(([a], [b]) => a - b).flatMap(([, events]) => events);
+    return [...this.courseEvents, ...loaded].sort((a, b) => a.position - b.position);
+  }
+
+  /** Lists the events of the kinds that are shown. */
+  listEvents(shows: (event: ReplayEvent) => boolean): void {
+    const events = this.allEvents().filter(shows);
+    const before = this.listedEvents;
+    if (before?.length === events.length && events.every((event, i) => event === before[i])) return;
+    this.listedEvents = events;
+    const { steps, course, format } = this.options;
+    this.eventList.show(events, format, steps === null || course !== null ? "" : ", loaded parts only");
+    this.eventList.update(this.frame?.position ?? 0);
+  }
+
+  /** The nearest event in a direction; searches further parts of a game if necessary. */
+  async findEvent(
+    from: number,
+    direction: 1 | -1,
+    shows: (event: ReplayEvent) => boolean,
+  ): Promise<ReplayEvent | null> {
+    const isFound = (event: ReplayEvent): boolean =>
+      shows(event) && (direction === 1 ? event.position > from + 1e-4 : event.position < from - 1e-4);
+    const nearest = (events: readonly ReplayEvent[]): ReplayEvent | undefined =>
+      direction === 1 ? events.find(isFound) : events.findLast(isFound);
+    if (this.options.course !== null) return nearest(this.allEvents()) ?? null;
+    const { source } = this.options;
+    for (let index = source.indexOf(Math.min(from, this.last)); ; index += direction) {
+      const start = source.startOf(index);
+      if (start === null) return null;
+      if (!this.partEvents.has(index)) this.addPart(await source.partAt(start));
+      const found = nearest(this.partEvents.get(index) ?? []);
+      if (found !== undefined) return found;
+    }
+  }
+
+  get title(): string {
+    return this.options.title;
+  }
+
+  /** How the replay ends, in words. */
+  get motionEnd(): string {
+    const motion = this.frame?.part.motion;
+    return this.options.outcome ?? (motion === undefined ? "" : endText(motion));
+  }
+
+  /** What a saved picture shows, as text. */
+  caption(): Caption {
+    const { title, names, format, steps } = this.options;
+    const time = `${timeText(this.step, format)} (step ${this.step})`;
+    const score = steps === null ? null : this.scoreAt(this.step);
+    if (steps === null || score === null) return { parts: [{ text: title }], detail: time };
+    return {
+      parts: [
+        { text: names[0], colour: "rp-mallet" },
+        { text: `${score[0]} : ${score[1]}` },
+        { text: names[1], colour: "rp-other-mallet" },
+      ],
+      detail: `${time} · ${title}`,
+    };
+  }
+
+  get palette(): Palette {
+    return paletteOf(this.options.section);
+  }
+
+  /** The state that is drawn; null before it is loaded. */
+  get drawnFrame(): FrameState | null {
+    return this.frame;
+  }
+
+  readonly invalidate = (): void => {
+    if (this.isDrawRequested) return;
+    this.isDrawRequested = true;
+    this.options.loop.draw(this.draw);
+  };
 
   /** Inserts an element below the still picture. */
   private insertBelowStill(element: HTMLElement): void {
@@ -185,106 +242,28 @@ export class Viewer {
     if (still === null) section.prepend(this.element);
     else still.replaceWith(this.element);
     section.dataset.view = this.picture.isFlat ? "flat" : "3d";
-    this.picture.paint(paletteOf(section));
-    this.strips.paint(paletteOf(section));
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
-      this.picture.paint(paletteOf(section));
-      this.strips.paint(paletteOf(section));
+    const paint = (): void => {
+      this.picture.paint(this.palette);
+      this.strips.paint(this.palette);
       this.invalidate();
-    });
-    addEventListener("hashchange", () => {
-      this.applyFragment();
-    });
-  }
-
-  /** Goes to the moment and view in the fragment of the address. */
-  private applyFragment(): void {
-    const { clock } = this.options;
-    const target = parseFragment(location.hash);
-    if (target.camera !== undefined) this.picture.setCamera(target.camera);
-    if (target.flat !== undefined) this.picture.setFlat(target.flat);
-    if (target.speed !== undefined) clock.setSpeed(target.speed);
-    if (target.step !== undefined) {
-      clock.pause();
-      clock.seek(target.step);
-    }
-    this.invalidate();
-  }
-
-  private fragment(): string {
-    const { clock } = this.options;
-    const step = Math.min(Math.floor(clock.position + 1e-6), this.lastStep);
-    return writeFragment({
-      step,
-      camera: this.camera() ?? "corner",
-      flat: this.picture.isFlat,
-      speed: clock.speed,
-    });
-  }
-
-  private camera(): Camera | null {
-    return this.picture.view3d?.orbit.camera ?? null;
-  }
-
-  private readonly toCamera = (camera: Camera): void => {
-    if (this.picture.unavailable !== null) return;
-    this.picture.setFlat(false);
-    this.picture.setCamera(camera);
-  };
-
-  private readonly toEvent = (direction: 1 | -1): void => {
-    const { clock } = this.options;
-    clock.pause();
-    const from = clock.position;
-    this.findEvent(from, direction).then(
-      (event) => {
-        // The visitor has moved on during the search.
-        if (clock.position !== from) return;
-        if (event === null) {
-          this.announce(direction === 1 ? "No later event" : "No earlier event");
-        } else {
-          clock.seek(event.position);
-          this.announce(`${fixed(event.position * clock.stepS, 2)} s: ${event.text}`);
-        }
-      },
-      (error: unknown) => {
-        this.announce(`Events could not be loaded: ${errorText(error)}`);
-      },
-    );
-  };
-
-  /** The nearest event in a direction; searches further parts of a game if necessary. */
-  private async findEvent(from: number, direction: 1 | -1): Promise<ReplayEvent | null> {
-    const { source } = this.options;
-    for (let index = source.indexOf(Math.min(from, this.lastStep)); ; index += direction) {
-      const start = source.startOf(index);
-      if (start === null) return null;
-      if (!this.events.has(index)) this.addPart(await source.partAt(start));
-      const events = this.events.get(index) ?? [];
-      const found =
-        direction === 1
-          ? events.find((event) => event.position > from + 1e-4)
-          : events.findLast((event) => event.position < from - 1e-4);
-      if (found !== undefined) return found;
-    }
-  }
-
-  private allEvents(): ReplayEvent[] {
-    const chunks = [...this.events.entries()].sort(([a], [b]) => a - b);
-    return chunks.flatMap(([, events]) => events);
+    };
+    paint();
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", paint);
   }
 
   /** Adds the events and scores of a loaded part. */
   private addPart(part: ReplayPart): void {
-    if (this.events.has(part.index)) return;
-    this.events.set(part.index, eventsOf(part.motion, part.observed));
+    if (this.partEvents.has(part.index)) return;
+    const { course, names } = this.options;
+    const events = eventsOf(part.motion, part.observed, names);
+    const isInCourse = ({ kind }: ReplayEvent): boolean =>
+      course !== null && (kind === "goal" || kind === "foul" || kind === "rally" || kind === "violation");
+    this.partEvents.set(
+      part.index,
+      events.filter((event) => !isInCourse(event)),
+    );
     this.score.addChunk(part.index, part.motion.breaks, part.motion.score);
-    const events = this.allEvents();
-    const { stepS } = part.motion;
-    const note = this.options.steps === null ? "" : ", loaded parts only";
-    this.timeline.update(Math.max(this.step, 0), this.lastStep, stepS);
-    this.timeline.show(events, stepS);
-    this.eventList.show(events, stepS, note);
+    this.events.eventsChanged();
   }
 
   /** Shows a part. */
@@ -295,7 +274,7 @@ export class Viewer {
       position: 0,
       pose: newPose(),
       arms: [new Kinematics(0), new Kinematics(1)],
-      layers: this.layers,
+      layers: this.options.layers,
       seenX: NaN,
       seenY: NaN,
       isPuckLost: false,
@@ -303,10 +282,7 @@ export class Viewer {
     this.frame.part = part;
     this.strips.show(part);
     this.dataTable.show(part);
-    this.layerChoice.update({
-      seen: part.observed !== null && part.observed.seenX !== null,
-      commanded: part.paths.commanded !== null,
-    });
+    this.events.partShown(part);
     section.dataset.state = "ready";
     if (part.observationError !== null) {
       this.problem.classList.add("minor");
@@ -323,13 +299,13 @@ export class Viewer {
   /** Is the part at a position loaded? If not, starts to fetch it. */
   private ensureLoaded(position: number): boolean {
     const { source, section } = this.options;
-    const clamped = Math.min(position, this.lastStep);
+    const clamped = Math.min(position, this.last);
     if (this.frame === null || source.loadedPartAt(clamped) !== null) return true;
     const index = source.indexOf(clamped);
     if (this.loadingIndex === index) return false;
     this.loadingIndex = index;
     section.dataset.state = "loading";
-    this.picture.setTexts({ state: "Loading …", outcome: "", good: false, score: "" });
+    this.picture.setTexts({ state: "Loading …", outcome: "", good: false, score: this.scoreAt(clamped) });
     source.partAt(clamped).then(
       (part) => {
         this.addPart(part);
@@ -341,7 +317,7 @@ export class Viewer {
         if (this.loadingIndex !== index) return;
         this.options.clock.pause();
         section.dataset.state = "failed";
-        this.picture.setTexts({ state: "Not loaded", outcome: "", good: false, score: "" });
+        this.picture.setTexts({ state: "Not loaded", outcome: "", good: false, score: null });
         this.problem.classList.remove("minor");
         this.problem.replaceChildren(
           h("p", {}, `This part of the replay could not be loaded: ${errorText(error)}.`),
@@ -357,23 +333,13 @@ export class Viewer {
     return false;
   }
 
-  private readonly invalidate = (): void => {
-    if (this.isDrawRequested) return;
-    this.isDrawRequested = true;
-    this.options.loop.draw(this.draw);
-  };
-
   private readonly draw = (nowMs: number): void => {
     this.isDrawRequested = false;
-    const { clock, source } = this.options;
+    const { clock, source, section } = this.options;
     const { frame } = this;
     if (frame === null) return;
-    const position = Math.min(clock.position, this.lastStep);
+    const position = Math.min(clock.position, this.last);
     const step = Math.floor(position + 1e-6);
-    const { stepS } = frame.part.motion;
-    this.transport.update(step, this.lastStep, stepS);
-    this.timeline.update(step, this.lastStep, stepS);
-    this.announcePlayback(step);
     if (!this.ensureLoaded(position)) return;
     this.clearProblem();
     const part = source.loadedPartAt(position);
@@ -382,7 +348,7 @@ export class Viewer {
       this.addPart(part);
     }
     if (clock.playing) {
-      source.prefetch(position);
+      source.prefetch(position, Math.min(Math.ceil(clock.speed / 4), MAX_AHEAD));
       if (!this.picture.isFlat) this.picture.view3d?.adaptQuality(nowMs);
     }
 
@@ -391,8 +357,7 @@ export class Viewer {
     const moving = !this.picture.isFlat && orbit?.tick(nowMs, frame.pose) === true;
     const calls = this.picture.draw(frame);
     this.updateValues(frame, step, nowMs);
-    this.cameras.update(this.picture.isFlat, this.camera(), this.picture.unavailable === null);
-    const { section } = this.options;
+    this.events.drawn();
     setData(section, "step", String(step));
     setData(section, "drawCalls", String(calls));
     section.dataset.state = "ready";
@@ -438,47 +403,37 @@ export class Viewer {
       `Puck at x ${fixed(x, 3)} m, y ${fixed(y, 3)} m, ${Number.isNaN(speed) ? "" : `${fixed(speed, 2)} m/s`}${seen}`,
     );
     const hasEnded = motion.end !== null && step >= motion.end.steps;
-    const score = motion.contest === "game" ? this.score.at(frame.position) : null;
     const symbol = motion.end?.success === true ? "✓ " : motion.end?.success === false ? "✕ " : "";
     this.picture.setTexts({
-      state: this.lastStep === 0 ? "No steps" : frame.isPuckLost ? "○ Puck not seen by the camera" : "",
-      outcome: hasEnded ? symbol + endText(motion) : "",
+      state: this.last === 0 ? "No steps" : frame.isPuckLost ? "○ Puck not seen by the camera" : "",
+      outcome: hasEnded ? symbol + this.motionEnd : "",
       good: motion.end?.success === true,
-      score: score === null ? "" : `A ${score[0]} : ${score[1]} B`,
+      score: motion.contest === "game" ? this.scoreAt(frame.position) : null,
     });
     this.step = step;
   }
 
-  /** Announces start and end of playback to screen readers; never changes of each frame. */
-  private announcePlayback(step: number): void {
-    const { clock } = this.options;
-    if (clock.playing === this.wasPlaying) return;
-    this.wasPlaying = clock.playing;
-    const motion = this.frame?.part.motion;
-    if (clock.playing) this.announce("Playing");
-    else if (step >= this.lastStep && motion !== undefined) this.announce(endText(motion) || "End");
-    else this.announce(`Paused at step ${step}`);
+  private scoreAt(position: number): readonly [number, number] | null {
+    const { course, steps } = this.options;
+    if (steps === null) return null;
+    return course === null ? this.score.at(position) : courseScore(course, position);
+  }
+
+  /** The score at a position as text; empty for an episode. */
+  scoreTextAt(position: number): string {
+    const score = this.scoreAt(position);
+    return score === null ? "" : scoreText(score, this.options.names);
   }
 
   private viewSwitched(): void {
     const { section } = this.options;
-    // Also called during the construction of the stage.
-    const stage = this.picture as Picture | undefined;
-    if (stage === undefined) return;
-    section.dataset.view = stage.isFlat ? "flat" : "3d";
-    if (this.frame !== null) this.announce(stage.unavailable ?? (stage.isFlat ? "Flat view" : "3-D view"));
+    // Also called during the construction of the picture.
+    const picture = this.picture as Picture | undefined;
+    if (picture === undefined) return;
+    section.dataset.view = picture.isFlat ? "flat" : "3d";
+    if (this.frame !== null && picture.unavailable !== null) this.events.announce(picture.unavailable);
+    this.events.viewSwitched();
     this.invalidate();
-  }
-
-  private announce(text: string): void {
-    this.statusLine.textContent = text;
-  }
-
-  private async save(): Promise<void> {
-    if (this.frame === null) return;
-    const picture = await this.picture.toPng(this.frame);
-    if (picture === null) this.announce("The picture could not be saved");
-    else saveFile(picture, `${fileName(this.options.title, this.frame.part)}-step-${this.step}.png`);
   }
 }
 

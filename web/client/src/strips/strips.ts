@@ -1,8 +1,8 @@
 // All strip charts below the picture.
 
 import { h } from "../controls/dom";
-import { fixed } from "../controls/format";
-import { sideName } from "../replay/events";
+import { timeText } from "../controls/format";
+import { sideName, type SideNames } from "../replay/events";
 import type { Palette } from "../replay/palette";
 import type { ReplayPart } from "../replay/source";
 import { seriesOf } from "./series";
@@ -19,9 +19,14 @@ export class StripCharts {
   private part: ReplayPart | null = null;
   private palette: Palette | null = null;
   private position = 0;
+  private wantedArm: 0 | 1 = 0;
 
-  constructor(private readonly seek: (sample: number) => void) {
+  constructor(
+    private readonly names: SideNames,
+    private readonly seek: (sample: number) => void,
+  ) {
     this.choice.addEventListener("change", () => {
+      this.wantedArm = this.choice.selectedIndex === 1 ? 1 : 0;
       this.rebuild();
     });
     this.element = h(
@@ -30,7 +35,7 @@ export class StripCharts {
       h(
         "div",
         { class: "row" },
-        h("span", { class: "heading" }, "Margins and times"),
+        h("h2", { class: "heading" }, "Margins and times"),
         this.span,
         this.choiceRow,
       ),
@@ -49,17 +54,25 @@ export class StripCharts {
   show(part: ReplayPart): void {
     if (part === this.part) return;
     this.part = part;
-    const chosen = Math.max(this.choice.selectedIndex, 0);
-    const arms = part.motion.arms.map((_, side) =>
-      h("option", {}, sideName(part.motion, side === 0 ? 0 : 1)),
-    );
+    const arms = part.motion.arms.map((_, side) => h("option", {}, this.armName(part, side === 0 ? 0 : 1)));
     this.choice.replaceChildren(...arms);
-    this.choice.selectedIndex = Math.min(chosen, arms.length - 1);
+    this.choice.selectedIndex = Math.min(this.wantedArm, arms.length - 1);
     this.choiceRow.hidden = arms.length < 2;
     const { first, samples, stepS, contest } = part.motion;
-    const from = fixed(first * stepS, 1);
-    const to = fixed((first + samples - 1) * stepS, 1);
-    this.span.textContent = contest === "game" ? `this part: ${from} to ${to} s` : "";
+    const format = { stepS, hasMinutes: contest === "game" };
+    const to = timeText(first + samples - 1, format);
+    this.span.textContent = contest === "game" ? `${timeText(first, format)} to ${to}` : "";
+    this.rebuild();
+  }
+
+  /** The arm whose values are shown. */
+  get arm(): 0 | 1 {
+    return this.wantedArm;
+  }
+
+  setArm(arm: 0 | 1): void {
+    this.wantedArm = arm;
+    this.choice.selectedIndex = Math.min(arm, this.choice.length - 1);
     this.rebuild();
   }
 
@@ -71,6 +84,11 @@ export class StripCharts {
   update(position: number): void {
     this.position = position;
     for (const strip of this.strips) strip.update(position);
+  }
+
+  private armName({ motion }: ReplayPart, side: 0 | 1): string {
+    const name = sideName(motion, side, this.names);
+    return motion.contest === "game" ? `${name} (${side === 0 ? "left" : "right"})` : name;
   }
 
   private rebuild(): void {

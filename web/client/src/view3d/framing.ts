@@ -1,16 +1,11 @@
 // Where the camera must be to show certain points as large as possible.
 
+import type { CameraPosition } from "../replay/fragment";
+
 export interface Point3 {
   readonly x: number;
   readonly y: number;
   readonly z: number;
-}
-
-/** Camera position: the point x, y, z that it looks at, and its angles (rad) and distance (m) from there. */
-export interface CameraPosition extends Point3 {
-  readonly azimuth: number;
-  readonly elevation: number;
-  readonly distance: number;
 }
 
 /** Shape of the picture: tangents of half its field of view, horizontally and vertically. */

@@ -1,7 +1,7 @@
 // The camera of the 3-D view, which moves on a sphere around a point of the table.
 
-import type { Camera } from "../replay/fragment";
-import { cameraAxes, type CameraPosition, type Field } from "./framing";
+import type { Camera, CameraPosition } from "../replay/fragment";
+import { cameraAxes, type Field } from "./framing";
 import { cameraPosition, followedPoint } from "./scenes";
 
 const RAD_PER_DEG = Math.PI / 180;
@@ -38,6 +38,8 @@ export class Orbit implements CameraPosition {
   /** Arms on the table. */
   private arms = 1;
   private field: Field = { tanX: 0.4, tanY: 0.25 };
+  /** Is the shape of the picture known? */
+  private isFramed = false;
 
   /** `prefersReducedMotion`: the camera jumps. */
   constructor(
@@ -55,15 +57,23 @@ export class Orbit implements CameraPosition {
     this.animateTo(camera === "follow" ? { ...position, x: this.x, y: this.y } : position);
   }
 
+  /** Moves the camera to a position of a link. */
+  restore(position: CameraPosition): void {
+    this.camera = null;
+    this.animateTo(this.turned(position, 0, 0, 1));
+  }
+
   /** Fits the picture to another shape or number of arms, at once. */
   frame(field: Field, arms: number): void {
+    // What was turned and zoomed by hand keeps its share of the picture when its shape changes.
+    const isReshaped = this.isFramed && arms === this.arms;
     const before = cameraPosition("corner", this.arms, this.field).distance;
+    const factor = isReshaped ? cameraPosition("corner", arms, field).distance / before : 1;
+    this.isFramed = true;
     this.field = field;
     this.arms = arms;
     this.animationStart = null;
     if (this.camera === null) {
-      // What was turned and zoomed by hand keeps its share of the picture.
-      const factor = cameraPosition("corner", arms, field).distance / before;
       this.target = this.turned(this.target, 0, 0, factor);
     } else {
       const position = cameraPosition(this.camera, arms, field);

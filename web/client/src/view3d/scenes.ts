@@ -2,8 +2,8 @@
 
 import { MODEL } from "../model/model";
 import { OUTER_HALF_SIZE } from "../model/table";
-import type { Camera } from "../replay/fragment";
-import { corners, fit, type CameraPosition, type Field, type Point3 } from "./framing";
+import type { Camera, CameraPosition } from "../replay/fragment";
+import { corners, fit, type Field, type Point3 } from "./framing";
 import { FLOOR_Z_M } from "./room";
 
 const RAD_PER_DEG = Math.PI / 180;

@@ -25,6 +25,8 @@ export class View3D implements View {
   readonly orbit: Orbit;
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
+  /** Share of the height that no controls cover. */
+  private visibleShare = 1;
   private readonly camera = new PerspectiveCamera(FIELD_OF_VIEW_DEG, 1.6, 0.1, 60);
   private readonly floor = new Floor();
   private readonly puck = new PuckModel();
@@ -71,14 +73,16 @@ export class View3D implements View {
     this.scene.add(this.puck.group, ...layers);
   }
 
-  resize(width: number, height: number, ratio: number): void {
+  /** `coveredPx`: height at the bottom that controls cover; the table is drawn above it. */
+  resize(width: number, height: number, ratio: number, coveredPx = 0): void {
     if (width === 0 || height === 0) return;
     this.ratio = ratio;
     this.height = height;
     this.renderer.setPixelRatio(Math.min(ratio, this.quality.ratio));
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
+    this.camera.setViewOffset(width, height, 0, coveredPx / 2, width, height);
+    this.visibleShare = (height - coveredPx) / height;
     this.frameCamera();
   }
 
@@ -147,7 +151,8 @@ export class View3D implements View {
 
   private frameCamera(): void {
     const field = fieldOf((FIELD_OF_VIEW_DEG * Math.PI) / 180, this.camera.aspect);
-    this.orbit.frame(field, Math.max(this.arms.length, 1));
+    const visible = { ...field, tanY: field.tanY * this.visibleShare };
+    this.orbit.frame(visible, Math.max(this.arms.length, 1));
   }
 
   private placeCamera(): void {

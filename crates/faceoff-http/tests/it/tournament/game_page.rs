@@ -86,9 +86,10 @@ async fn game_page_shows_result_and_reason() {
     let view = cup.site.get(&path, None).await.json(200);
     let html = page(&cup, &game).await;
     let verdict = texts(&html, ".verdict").remove(0);
+    let names = cup.names(&game).await;
     let [home, away] = [0, 1].map(|side| view["result"]["score"][side].to_string());
     assert!(
-        verdict.starts_with(&format!("{home} : {away}")),
+        verdict.starts_with(&format!("{} {home} : {away} {}", names[0], names[1])),
         "{verdict}"
     );
     assert!(

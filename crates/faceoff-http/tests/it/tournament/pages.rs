@@ -401,7 +401,7 @@ async fn running_game_page_shows_score_and_live_stream() {
     let cup = TestTournament::open(&["A", "B"], one_round()).await;
     cup.start_round().await;
     let (claim, game, seed) = cup.claim().await.unwrap();
-    let [home, _] = cup.names(&game).await;
+    let [home, away] = cup.names(&game).await;
     let live = &cup.site.live.games;
     // A game has 45,000 control steps: 15 minutes.
     live.begin(game.id, 1, 45_000);
@@ -422,7 +422,7 @@ async fn running_game_page_shows_score_and_live_stream() {
     let html = page(&cup.site, &game_path).await;
     let verdict = texts(&html, ".verdict").remove(0);
     assert!(
-        verdict.starts_with("1 : 0 after 1.0 of 15.0 minutes"),
+        verdict.starts_with(&format!("{home} 1 : 0 {away} after 1.0 of 15.0 minutes")),
         "{verdict}"
     );
     let events = rows(&html, "[data-live-region=live] tbody tr");
@@ -460,5 +460,5 @@ async fn running_game_page_shows_score_and_live_stream() {
         .await;
     let finished = page(&cup.site, &game_path).await;
     assert_eq!(stream(&finished), None);
-    assert!(texts(&finished, ".verdict")[0].starts_with("3 : 0"));
+    assert!(texts(&finished, ".verdict")[0].starts_with(&format!("{home} 3 : 0 {away}")));
 }

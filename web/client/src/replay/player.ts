@@ -1,0 +1,426 @@
+// The player: the controls of one replay, or of several that share a clock.
+
+import { Cameras } from "../controls/cameras";
+import { saveFile } from "../controls/data";
+import { button, h } from "../controls/dom";
+import { EventKinds } from "../controls/event-kinds";
+import { stepText, timeText, type TimeFormat } from "../controls/format";
+import { helpDialog } from "../controls/help";
+import { listenForKeys } from "../controls/keys";
+import { LayerChoice } from "../controls/layers";
+import { fullScreenButton, ShareRow } from "../controls/share";
+import { Timeline } from "../controls/timeline";
+import { Transport } from "../controls/transport";
+import { captionedSize, drawCaptioned } from "./caption";
+import type { Clock } from "./clock";
+import { parseCourse } from "./course";
+import type { ReplayEvent, SideNames } from "./events";
+import { parseFragment, writeFragment, type Camera, type LinkTarget } from "./fragment";
+import type { Layers } from "./frame-state";
+import type { FrameLoop } from "./loop";
+import type { Palette } from "./palette";
+import { canRecord, MAX_VIDEO_WIDTH, VideoRecording } from "./recorder";
+import { errorText, Source, type ReplayPart } from "./source";
+import { Viewer } from "./viewer";
+
+/** What a player needs from its page. */
+export interface PlayerOptions {
+  readonly sections: readonly HTMLElement[];
+  readonly clock: Clock;
+  readonly loop: FrameLoop;
+  readonly prefersReducedMotion: boolean;
+}
+
+/** A recording that is running, with the colours at its start. */
+interface RunningRecording {
+  readonly video: VideoRecording;
+  readonly palette: Palette;
+}
+
+/** Replays that share a clock, with one set of controls. */
+export class Player {
+  private readonly viewers: readonly Viewer[];
+  private readonly layers: Layers = {
+    seen: true,
+    mallet: true,
+    commanded: true,
+    puck: true,
+    wholePart: false,
+  };
+  private readonly format: TimeFormat;
+  private readonly statusLine = h("p", { class: "sr", attributes: { role: "status" } });
+  private readonly transport: Transport;
+  private readonly timeline: Timeline;
+  private readonly cameras: Cameras;
+  private readonly layerChoice: LayerChoice;
+  private readonly kinds: EventKinds;
+  private readonly share: ShareRow;
+  private readonly controls: HTMLElement;
+  private readonly viewPanel: HTMLElement;
+  private readonly viewButton: HTMLButtonElement;
+  private isUpdateRequested = false;
+  private wasPlaying = false;
+  private shownEvents: readonly ReplayEvent[] | null = null;
+  private recording: RunningRecording | null = null;
+
+  constructor(private readonly options: PlayerOptions) {
+    const { clock, sections } = options;
+    const isGame = sections[0].dataset.chunks !== undefined;
+    this.format = { stepS: clock.stepS, hasMinutes: isGame };
+    this.kinds = new EventKinds(isGame, () => { this.showEvents(); }); // prettier-ignore
+    const redraw = (): void => {
+      for (const viewer of this.viewers) viewer.invalidate();
+      this.invalidate();
+    };
+    this.layerChoice = new LayerChoice(this.layers, redraw);
+    const help = helpDialog();
+    const fullScreen = fullScreenButton(() => this.fullScreenElement);
+    this.viewButton = button("View", () => { this.togglePanel(); }); // prettier-ignore
+    this.viewButton.classList.add("view-button");
+    this.viewButton.setAttribute("aria-expanded", "false");
+    this.transport = new Transport(
+      clock,
+      this.format,
+      {
+        event: this.toEvent,
+        goal: (direction) => { this.toNearest(direction, (event) => event.kind === "goal", "goal"); },
+      },
+      [this.viewButton, ...(fullScreen === null ? [] : [fullScreen])],
+    ); // prettier-ignore
+    const title = sections[0].dataset.title ?? "the replay";
+    this.timeline = new Timeline(clock, this.format, (event) => { this.seek(event.position); }, title); // prettier-ignore
+    this.cameras = new Cameras({
+      preset: this.toCamera,
+      orbit: (right, up) => { this.forEach((viewer) => viewer.picture.view3d?.orbit.turn(right, up)); },
+      zoom: (steps) => { this.forEach((viewer) => viewer.picture.view3d?.orbit.zoom(steps)); },
+      flat: (flat) => { this.setFlat(flat); },
+    }); // prettier-ignore
+    this.share = new ShareRow({
+      link: () => location.href.replace(/#.*$/, "") + this.fragment(),
+      save: () => { this.savePictures(); },
+      record: canRecord() && sections.length === 1 ? () => { this.toggleRecording(); } : null,
+      help: () => { help.showModal(); },
+      announce: this.announce,
+    }); // prettier-ignore
+    this.controls = h("div", { class: "controls" }, this.timeline.element, this.transport.element);
+    this.viewPanel = h("div", { class: "view-panel" }, this.cameras.element, this.layerChoice.element);
+    this.viewers = sections.map((section) => this.viewerOf(section, isGame));
+    this.mount(help);
+    listenForKeys((element) => this.contains(element), {
+      toggle: () => { this.toggleInView(); },
+      step: (by) => { clock.step(by); },
+      event: this.toEvent,
+      camera: this.toCamera,
+      flat: () => { this.setFlat(!this.isFlat); },
+      help: () => { help.showModal(); },
+    }); // prettier-ignore
+    clock.addListener(this.invalidate);
+    addEventListener("hashchange", () => { this.follow(parseFragment(location.hash)); }); // prettier-ignore
+  }
+
+  /** Loads the replays, and goes to the moment of the page's address. */
+  async open(): Promise<void> {
+    const target = parseFragment(location.hash);
+    const opened = await Promise.all(this.viewers.map((viewer) => viewer.open(target.step ?? 0)));
+    if (!opened.some(Boolean)) return;
+    this.invalidate();
+    this.follow(target);
+  }
+
+  private viewerOf(section: HTMLElement, isGame: boolean): Viewer {
+    const { motion, observed, chunks, observedChunks, samples, title, home, away, outcome, course } =
+      section.dataset;
+    const count = isGame ? Number(samples ?? 1) : null;
+    const names: SideNames = [home ?? "left", away ?? "right"];
+    const { clock, loop, prefersReducedMotion } = this.options;
+    const { layers, format } = this;
+    const source = new Source(
+      {
+        motion: chunks ?? motion ?? "",
+        observed: (isGame ? observedChunks : observed) ?? null,
+        samples: count,
+      },
+      (...request) => fetch(...request),
+    );
+    const parsedCourse = parseCourse(course);
+    if (parsedCourse !== null && count !== null) this.timeline.showCourse(parsedCourse.ends, count - 1);
+    const options = {
+      section,
+      title: title ?? "the replay",
+      source,
+      steps: count === null ? null : count - 1,
+      names,
+      outcome: outcome ?? null,
+      course: parsedCourse,
+      clock,
+      loop,
+      layers,
+      format,
+      prefersReducedMotion,
+    };
+    const viewer: Viewer = new Viewer(options, {
+      announce: this.announce,
+      clicked: () => { clock.toggle(); },
+      viewSwitched: this.invalidate,
+      eventsChanged: () => { this.showEvents(); },
+      partShown: (part) => { this.offerLayers(part); },
+      drawn: () => { this.drawn(viewer); },
+    }); // prettier-ignore
+    return viewer;
+  }
+
+  /** Puts the controls on the only picture, or below several. */
+  private mount(help: HTMLElement): void {
+    const [first] = this.viewers;
+    const [section] = this.options.sections;
+    const isEmbedded = section.dataset.embed !== undefined;
+    const rest = isEmbedded ? [] : [this.share.element];
+    if (this.viewers.length === 1) {
+      first.screen.append(this.controls);
+      first.screen.after(this.viewPanel, ...rest);
+      first.stage.append(help, this.statusLine);
+      if (!isEmbedded) first.details.prepend(this.kinds.element);
+      // A panel below the picture covers nothing of it.
+      new ResizeObserver(() => {
+        const isOverlaid = getComputedStyle(this.controls).position === "absolute";
+        first.picture.setCovered(isOverlaid ? this.controls.offsetHeight : 0);
+      }).observe(this.controls);
+      return;
+    }
+    const panel = h("div", { class: "shared-controls replay" }, this.controls, this.viewPanel, ...rest);
+    const details = this.viewers.map((viewer) => viewer.details);
+    const pairs = h("div", { class: "side-by-side replay" }, ...details);
+    panel.append(this.kinds.element, help, this.statusLine);
+    const together = section.closest(".together");
+    together?.append(panel);
+    together?.after(pairs);
+  }
+
+  private get fullScreenElement(): HTMLElement {
+    const together = this.options.sections[0].closest<HTMLElement>(".together");
+    return this.viewers.length === 1 || together === null ? this.viewers[0].stage : together;
+  }
+
+  private contains(element: Element): boolean {
+    return (
+      this.controls.parentElement?.contains(element) === true ||
+      this.viewers.some((viewer) => viewer.element.contains(element) || viewer.details.contains(element))
+    );
+  }
+
+  private forEach(change: (viewer: Viewer) => void): void {
+    this.viewers.forEach(change);
+  }
+
+  private seek(position: number): void {
+    this.options.clock.pause();
+    this.options.clock.seek(position);
+  }
+
+  private get step(): number {
+    const { clock } = this.options;
+    return Math.min(Math.floor(clock.position + 1e-6), clock.last);
+  }
+
+  private get isFlat(): boolean {
+    return this.viewers[0].picture.isFlat;
+  }
+
+  private setFlat(flat: boolean): void {
+    this.forEach((viewer) => { viewer.picture.setFlat(flat); }); // prettier-ignore
+    this.announce(this.isFlat ? "Flat view" : "3-D view");
+  }
+
+  private readonly toCamera = (camera: Camera): void => {
+    if (this.viewers[0].picture.unavailable !== null) return;
+    if (this.isFlat) this.setFlat(false);
+    this.forEach((viewer) => { viewer.picture.setCamera(camera); }); // prettier-ignore
+  };
+
+  /** Plays or pauses; a picture that is out of sight is scrolled into it before it plays. */
+  private toggleInView(): void {
+    const { clock } = this.options;
+    const box = this.viewers[0].screen.getBoundingClientRect();
+    if (!clock.playing && (box.bottom < 0 || box.top > innerHeight)) this.scrollToPicture();
+    clock.toggle();
+  }
+
+  private scrollToPicture(): void {
+    const target = this.viewers.length === 1 ? this.viewers[0].stage : this.fullScreenElement;
+    target.scrollIntoView({ block: "start" });
+  }
+
+  /** Shows what a link names. A link to a moment plays from there, unless the visitor prefers reduced motion. */
+  private follow(target: LinkTarget): void {
+    const { clock, prefersReducedMotion } = this.options;
+    const { step, camera, flat, speed, layers, arm, hiddenKinds } = target;
+    if (camera !== undefined) this.forEach((viewer) => { viewer.picture.setCamera(camera); }); // prettier-ignore
+    if (flat !== undefined) this.forEach((viewer) => { viewer.picture.setFlat(flat); }); // prettier-ignore
+    if (speed !== undefined) clock.setSpeed(speed);
+    if (layers !== undefined) this.layerChoice.set(layers);
+    if (arm !== undefined) this.forEach((viewer) => { viewer.strips.setArm(arm); }); // prettier-ignore
+    if (hiddenKinds !== undefined) this.kinds.hide(hiddenKinds);
+    if (step === undefined) return;
+    this.seek(step);
+    this.scrollToPicture();
+    if (!prefersReducedMotion && clock.position < clock.last) clock.play();
+  }
+
+  private fragment(): string {
+    const [first] = this.viewers;
+    const { camera } = first.picture;
+    const hiddenKinds = this.kinds.changedKinds;
+    return writeFragment({
+      step: this.step,
+      ...(camera === null ? {} : { camera }),
+      flat: this.isFlat,
+      speed: this.options.clock.speed,
+      layers: this.layers,
+      arm: first.strips.arm,
+      ...(hiddenKinds === undefined ? {} : { hiddenKinds }),
+    });
+  }
+
+  private readonly toEvent = (direction: 1 | -1): void => {
+    this.toNearest(direction, this.kinds.shows, "event");
+  };
+
+  private toNearest(direction: 1 | -1, shows: (event: ReplayEvent) => boolean, name: string): void {
+    const { clock } = this.options;
+    clock.pause();
+    const from = clock.position;
+    Promise.all(this.viewers.map((viewer) => viewer.findEvent(from, direction, shows))).then(
+      (found) => {
+        // The visitor has moved on during the search.
+        if (clock.position !== from) return;
+        const events = found.filter((event) => event !== null);
+        events.sort((a, b) => direction * (a.position - b.position));
+        const event = events.at(0);
+        if (event === undefined) {
+          this.announce(direction === 1 ? `No later ${name}` : `No earlier ${name}`);
+          return;
+        }
+        clock.seek(event.position);
+        this.announce(`${timeText(event.position, this.format)}: ${event.text}`);
+      },
+      (error: unknown) => {
+        this.announce(`Events could not be loaded: ${errorText(error)}`);
+      },
+    );
+  }
+
+  /** Shows the events of the chosen kinds on the time line and in the lists. */
+  private showEvents(): void {
+    // Also called during construction.
+    const viewers = this.viewers as readonly Viewer[] | undefined;
+    if (viewers === undefined) return;
+    const all = viewers.flatMap((viewer) => viewer.allEvents()).sort((a, b) => a.position - b.position);
+    this.kinds.offer(all);
+    const events = all.filter(this.kinds.shows);
+    const before = this.shownEvents;
+    for (const viewer of viewers) viewer.listEvents(this.kinds.shows);
+    if (before?.length === events.length && events.every((event, i) => event === before[i])) return;
+    this.shownEvents = events;
+    this.timeline.update(this.step, this.options.clock.last);
+    this.timeline.show(events);
+  }
+
+  private offerLayers(part: ReplayPart): void {
+    this.layerChoice.update({
+      seen: part.observed !== null && part.observed.seenX !== null,
+      commanded: part.paths.commanded !== null,
+    });
+  }
+
+  private readonly invalidate = (): void => {
+    if (this.isUpdateRequested) return;
+    this.isUpdateRequested = true;
+    this.options.loop.draw(this.update);
+  };
+
+  private readonly update = (): void => {
+    this.isUpdateRequested = false;
+    const { clock } = this.options;
+    const { step } = this;
+    this.transport.update(step, clock.last);
+    this.timeline.update(step, clock.last);
+    this.announcePlayback(step);
+  };
+
+  private drawn(viewer: Viewer): void {
+    if (viewer !== this.viewers[0]) return;
+    const { picture } = viewer;
+    const camera = picture.view3d?.orbit.camera ?? null;
+    this.cameras.update(picture.isFlat, camera, picture.unavailable === null);
+    if (this.recording !== null)
+      drawCaptioned(this.recording.video.context, picture.canvas, viewer.caption(), this.recording.palette);
+  }
+
+  /** Announces start and end of playback to screen readers; never changes of each frame. */
+  private announcePlayback(step: number): void {
+    const { clock } = this.options;
+    if (clock.playing === this.wasPlaying) return;
+    this.wasPlaying = clock.playing;
+    if (!clock.playing && step >= clock.last && this.recording !== null) this.toggleRecording();
+    const [first] = this.viewers;
+    if (clock.playing) this.announce("Playing");
+    else if (step >= clock.last) this.announce(first.motionEnd || "End");
+    else this.announce(`Paused at ${[stepText(step, clock.last, this.format), first.scoreTextAt(step)].filter(Boolean).join(", ")}`); // prettier-ignore
+  }
+
+  private readonly announce = (text: string): void => {
+    this.statusLine.textContent = text;
+  };
+
+  private togglePanel(): void {
+    const isOpen = this.viewPanel.classList.toggle("open");
+    this.viewButton.setAttribute("aria-expanded", String(isOpen));
+  }
+
+  private fileName(viewer: Viewer, extension: string): string {
+    const { title } = viewer;
+    const slug = title.toLowerCase().replaceAll(/[^a-z0-9]+/g, "-").replaceAll(/^-|-$/g, ""); // prettier-ignore
+    return `${slug || "replay"}-step-${this.step}.${extension}`;
+  }
+
+  /** Saves a picture of each replay. */
+  private savePictures(): void {
+    for (const viewer of this.viewers) {
+      const frame = viewer.drawnFrame;
+      if (frame === null) continue;
+      const canvas = document.createElement("canvas");
+      viewer.picture.drawForSaving(frame, (drawing) => {
+        Object.assign(canvas, captionedSize(drawing.width, drawing.height));
+        const context = canvas.getContext("2d");
+        if (context !== null) drawCaptioned(context, drawing, viewer.caption(), viewer.palette);
+      });
+      canvas.toBlob((picture) => {
+        if (picture === null) this.announce("The picture could not be saved");
+        else saveFile(picture, this.fileName(viewer, "png"));
+      }, "image/png");
+    }
+  }
+
+  /** Starts a video at the current moment, or ends it and saves it. */
+  private toggleRecording(): void {
+    const { clock } = this.options;
+    if (this.recording !== null) {
+      const { video } = this.recording;
+      this.recording = null;
+      clock.pause();
+      this.share.showRecording(false);
+      void video.stop().then((file) => {
+        saveFile(file, this.fileName(this.viewers[0], "webm"));
+        this.announce("Video saved");
+      });
+      return;
+    }
+    const { canvas } = this.viewers[0].picture;
+    const width = Math.min(canvas.width, MAX_VIDEO_WIDTH);
+    const size = captionedSize(width, (canvas.height / canvas.width) * width);
+    this.recording = { video: new VideoRecording(size), palette: this.viewers[0].palette };
+    this.share.showRecording(true);
+    this.announce("Recording");
+    clock.play();
+  }
+}
