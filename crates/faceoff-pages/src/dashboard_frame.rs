@@ -17,10 +17,11 @@ pub(super) struct Tab {
 }
 
 /// Path and name of each page of the team dashboard.
-const TEAM_TABS: [(&str, &str); 3] = [
-    ("/dashboard", "Submissions"),
+const TEAM_TABS: [(&str, &str); 4] = [
+    ("/dashboard", "Overview"),
     ("/dashboard/questions", "Questions"),
     ("/dashboard/access", "Members and tokens"),
+    ("/dashboard/settings", "Settings"),
 ];
 
 /// Path and name of each page of the organiser dashboard.
@@ -157,6 +158,10 @@ const DONE_TEXTS: &[(&str, &str)] = &[
     ("unfrozen", "The boards of the stage show everything again."),
     ("final-day", "The final day has started."),
     ("signed-off", "The stage is signed off."),
+    (
+        "password-set",
+        "Password changed. Your other sessions and tokens no longer work.",
+    ),
     ("stage-made", "The stage was created."),
     ("stage-changed", "The stage was changed."),
     ("team-changed", "The team was changed."),
