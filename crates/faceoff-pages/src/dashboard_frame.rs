@@ -25,7 +25,7 @@ const TEAM_TABS: [(&str, &str); 4] = [
 ];
 
 /// Path and name of each page of the organiser dashboard.
-const ORGANISER_TABS: [(&str, &str); 9] = [
+const ORGANISER_TABS: [(&str, &str); 10] = [
     ("/organiser", "Overview"),
     ("/organiser/day", "Evaluation day"),
     ("/organiser/teams", "Teams"),
@@ -35,6 +35,7 @@ const ORGANISER_TABS: [(&str, &str); 9] = [
     ("/organiser/workers", "Workers"),
     ("/organiser/access", "Users and tokens"),
     ("/organiser/log", "Log"),
+    ("/organiser/settings", "Settings"),
 ];
 
 /// Header of a dashboard page.

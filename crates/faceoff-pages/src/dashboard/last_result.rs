@@ -1,8 +1,6 @@
 //! The last result of a team: its rank, a bar for each task, and the worst failed episodes.
 
-use crate::{
-    episode_text::describe_violation, figures::Rate, replay::page_path, replay_section::Still,
-};
+use crate::{figures::Rate, replay::page_path, replay_section::Still};
 use faceoff_api::{requests::BoardQuery, views::board::BoardRow};
 use faceoff_replay::EpisodeLine;
 use faceoff_service::{
@@ -40,7 +38,8 @@ pub(super) struct FailedEpisode {
     /// The page of its replay.
     pub(super) path: String,
     pub(super) end_reason: String,
-    pub(super) violations: Vec<String>,
+    /// Number of kinds of violations.
+    pub(super) violations: usize,
     pub(super) still: Still,
 }
 
@@ -70,7 +69,8 @@ pub(super) async fn of_team(app: &App, team: TeamId) -> Result<Option<LastResult
     }))
 }
 
-/// The failed episodes with the most violations, then with the most late answers; none if there are no replays, or none any more.
+/// The failed episodes with the most violations, then with the most late answers: first the worst one of each task, then others. None
+/// if there are no replays, or none any more.
 async fn worst_failed(
     app: &App,
     visibility: &Visibility,
@@ -84,20 +84,23 @@ async fn worst_failed(
     let mut lines = clips.episodes().await?.episodes;
     lines.retain(|line| !line.success && line.has_clips());
     lines.sort_by_key(|line| Reverse(badness(line)));
-    lines.truncate(MAX_FAILED);
-    let competition = app.config.competition();
+    let mut tasks = Vec::new();
+    let (mut worst, others): (Vec<EpisodeLine>, Vec<EpisodeLine>) =
+        lines.into_iter().partition(|line| {
+            let is_first = !tasks.contains(&line.task);
+            tasks.push(line.task);
+            is_first
+        });
+    worst.extend(others);
+    worst.truncate(MAX_FAILED);
     let mut failed = Vec::new();
-    for line in lines {
+    for line in worst {
         let episode = clips.episode(line.task, line.episode).await?;
         failed.push(FailedEpisode {
             task: line.task,
             episode: line.episode,
             path: page_path(row.evaluation, line.task, line.episode),
-            violations: line
-                .broken
-                .iter()
-                .map(|violation| describe_violation(competition, violation))
-                .collect(),
+            violations: line.broken.len(),
             end_reason: line.why,
             still: Still::new(&episode.motion, None),
         });

@@ -4,6 +4,7 @@ use faceoff_api::views::event::EventView;
 use faceoff_service::{app::AppState, problem::Problem, views::event};
 use faceoff_store::{Subject, SubjectContext};
 use std::collections::BTreeMap;
+use uuid::Uuid;
 
 /// Names by identifiers as the log writes them, such as `team:ID`.
 pub(super) struct Names(BTreeMap<String, String>);
@@ -89,11 +90,22 @@ impl Names {
 
     /// The author of an event, as the subject of a sentence.
     pub(super) fn actor(&self, event: &EventView) -> String {
-        let name = self.0.get(&event.actor).or(event.actor_name.as_ref());
+        // Whoever joins or signs in is a visitor until then.
+        let is_joining = event.actor == "visitor" && event.subject.starts_with("person:");
+        let author = match is_joining {
+            true => &event.subject,
+            false => &event.actor,
+        };
+        let name = self.0.get(author).or(event.actor_name.as_ref());
         match (event.actor.split_once(':'), name) {
             (Some(("team", _)), Some(name)) => format!("The team {name}"),
             (_, Some(name)) => name.clone(),
-            (Some(("worker", worker)), None) => format!("The worker {worker}"),
+            (Some(("worker", slot)), None) => match slot.split_once('/') {
+                // The server's own slots are named after its process.
+                Some((process, _)) if process.parse::<Uuid>().is_ok() => "The server".to_owned(),
+                Some((worker, _)) => format!("The worker {worker}"),
+                None => format!("The worker {slot}"),
+            },
             (Some(("person", _)), None) => "A former user".to_owned(),
             (Some(_), None) => "A team".to_owned(),
             (None, None) => match event.actor.as_str() {

@@ -355,6 +355,20 @@ mod tests {
                 "The server finished AiRLIHockey’s evaluation of 2026-03-01 with 52.3 %",
             ),
             (
+                "visitor",
+                "person:1",
+                "person_joined",
+                json!({ "name": "Anna", "team": "2" }),
+                "Anna joined the team AiRLIHockey",
+            ),
+            (
+                "worker:01a224ca-db27-7601-8eb6-400a32f24e25/slot-0",
+                "evaluation:4",
+                "evaluation_begun",
+                json!({}),
+                "The server started AiRLIHockey’s evaluation of 2026-03-01",
+            ),
+            (
                 "organiser",
                 "season",
                 "something_new",
