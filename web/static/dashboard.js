@@ -1,8 +1,11 @@
-// Script of the dashboards, the signed-in pages of teams and organisers: a progress bar for uploads, drag and drop, and sections
-// that update while work is in progress. Without JavaScript all of it works with forms and reloading.
+// Script of the dashboards, the signed-in pages of teams and organisers: a progress bar for uploads, drag and drop, forms that are sent
+// once, the time until the next cutoff, and sections that update while work is in progress. Without JavaScript all of it works with forms and reloading.
 
 // Interval between two reloads of a page that shows a validation run or evaluations in progress.
 const RELOAD_INTERVAL_MS = 3000;
+
+// Interval between two updates of the time until the next cutoff.
+const COUNTDOWN_INTERVAL_MS = 10_000;
 
 function showStatus(form, text) {
   let line = form.querySelector("[role=status]");
@@ -17,8 +20,12 @@ function showStatus(form, text) {
 function addProgressBar(form) {
   const progress = document.createElement("progress");
   progress.setAttribute("aria-label", "Uploaded");
-  form.append(progress);
-  return progress;
+  // The bar tells its value itself: the number beside it is for the eye only.
+  const percent = document.createElement("span");
+  percent.className = "percent";
+  percent.setAttribute("aria-hidden", "true");
+  form.append(progress, percent);
+  return { progress, percent };
 }
 
 // The error message in the HTML of a response; null if the page has none.
@@ -43,10 +50,11 @@ function showRefusal(form, alert, status) {
 function upload(form, event) {
   event.preventDefault();
   const button = form.querySelector("button");
-  const progress = addProgressBar(form);
+  const { progress, percent } = addProgressBar(form);
   const request = new XMLHttpRequest();
   const done = () => {
     progress.remove();
+    percent.remove();
     button.disabled = false;
   };
   button.disabled = true;
@@ -55,8 +63,9 @@ function upload(form, event) {
     if (!sent.lengthComputable) return;
     progress.max = sent.total;
     progress.value = sent.loaded;
-    const percent = Math.floor((100 * sent.loaded) / sent.total);
-    progress.setAttribute("aria-valuetext", `${percent} %`);
+    const text = `${Math.floor((100 * sent.loaded) / sent.total)} %`;
+    progress.setAttribute("aria-valuetext", text);
+    percent.textContent = text;
   });
   request.upload.addEventListener("load", () => showStatus(form, "Sent. The server is storing the bundle …"));
   request.addEventListener("load", () => {
@@ -127,6 +136,44 @@ async function reloadSections() {
   setTimeout(reloadSections, RELOAD_INTERVAL_MS);
 }
 
+// Sends a form once: a second click while the page waits for the answer sends nothing. The server does not rely on it.
+function sendOnce(event) {
+  const form = event.target;
+  if (event.defaultPrevented || form.method !== "post") return;
+  if (form.dataset.sent) {
+    event.preventDefault();
+    return;
+  }
+  form.dataset.sent = "yes";
+}
+
+// After the back button a page may come from the browser's memory: its forms can be sent again.
+function allowSending() {
+  for (const form of document.querySelectorAll("form[data-sent]")) delete form.dataset.sent;
+}
+
+// The time until a time, as the server writes it (countdown.rs).
+function timeUntil(milliseconds) {
+  const minutes = Math.ceil(milliseconds / 60_000);
+  if (minutes <= 0) return "now";
+  const hours = Math.floor(minutes / 60);
+  if (hours === 0) return `in ${minutes} min`;
+  const days = Math.floor(hours / 24);
+  if (days === 0) return `in ${hours} h ${minutes % 60} min`;
+  return `in ${days === 1 ? "1 day" : `${days} days`} ${hours % 24} h`;
+}
+
+function updateCountdowns() {
+  for (const element of document.querySelectorAll("[data-countdown]")) {
+    const text = timeUntil(Date.parse(element.dataset.countdown) - Date.now());
+    if (element.textContent !== text) element.textContent = text;
+  }
+}
+
+document.addEventListener("submit", sendOnce);
+addEventListener("pageshow", allowSending);
+updateCountdowns();
+setInterval(updateCountdowns, COUNTDOWN_INTERVAL_MS);
 for (const form of document.querySelectorAll("form[data-upload]")) {
   form.addEventListener("submit", (event) => upload(form, event));
   acceptDrops(form);

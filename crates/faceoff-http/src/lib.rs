@@ -47,12 +47,9 @@ pub fn router(store: Store, live: LiveState, config: HttpConfig) -> Router {
     let (api, document) = faceoff_rest::router(timeout, app.config.competition());
     let site = Router::new()
         .merge(api)
-        .merge(
-            faceoff_pages::router(timeout, document).layer(middleware::from_fn_with_state(
-                Arc::clone(&app),
-                layers::read_consistently,
-            )),
-        )
+        .merge(faceoff_pages::router(&app, timeout, document).layer(
+            middleware::from_fn_with_state(Arc::clone(&app), layers::read_consistently),
+        ))
         .merge(probes::router(timeout))
         .merge(worker_files::router())
         .fallback(faceoff_pages::path_not_found)
@@ -60,6 +57,10 @@ pub fn router(store: Store, live: LiveState, config: HttpConfig) -> Router {
         .layer(middleware::from_fn_with_state(
             Arc::clone(&app),
             read_only::refuse_changes,
+        ))
+        .layer(middleware::from_fn_with_state(
+            Arc::clone(&app),
+            faceoff_pages::identify_viewer,
         ))
         .with_state(Arc::clone(&app));
     layers::wrap(site, &app)

@@ -50,7 +50,7 @@ pub(super) async fn page(
         let user = caller.user()?.clone();
         Some((caller, user))
     }) else {
-        return Ok(Redirect::to("/sign-in").into_response());
+        return Ok(Redirect::to("/sign-in?next=%2Faccount").into_response());
     };
     let (own, now) = (TokensOf::User(user.id), app.config.clock.now());
     let mut tokens = app.store.valid_tokens(own, now).await?;

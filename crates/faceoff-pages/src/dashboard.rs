@@ -2,8 +2,11 @@
 
 pub(super) mod access;
 mod evaluations;
+mod games;
+mod last_result;
 mod overview;
 mod questions;
+pub(super) mod settings;
 mod submission;
 mod upload;
 
@@ -43,6 +46,8 @@ pub(super) fn router() -> Router<App> {
             "/dashboard/questions",
             get(questions::page).post(questions::ask),
         )
+        .merge(settings::router(BASE_PATH))
+        .merge(settings::team_router())
         .merge(access::router(BASE_PATH))
         .route(OLD_BASE_PATH, any(redirect_old_path))
         .route("/desk/{*rest}", any(redirect_old_path))

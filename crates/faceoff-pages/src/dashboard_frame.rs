@@ -17,14 +17,15 @@ pub(super) struct Tab {
 }
 
 /// Path and name of each page of the team dashboard.
-const TEAM_TABS: [(&str, &str); 3] = [
-    ("/dashboard", "Submissions"),
+const TEAM_TABS: [(&str, &str); 4] = [
+    ("/dashboard", "Overview"),
     ("/dashboard/questions", "Questions"),
     ("/dashboard/access", "Members and tokens"),
+    ("/dashboard/settings", "Settings"),
 ];
 
 /// Path and name of each page of the organiser dashboard.
-const ORGANISER_TABS: [(&str, &str); 9] = [
+const ORGANISER_TABS: [(&str, &str); 10] = [
     ("/organiser", "Overview"),
     ("/organiser/day", "Evaluation day"),
     ("/organiser/teams", "Teams"),
@@ -34,6 +35,7 @@ const ORGANISER_TABS: [(&str, &str); 9] = [
     ("/organiser/workers", "Workers"),
     ("/organiser/access", "Users and tokens"),
     ("/organiser/log", "Log"),
+    ("/organiser/settings", "Settings"),
 ];
 
 /// Header of a dashboard page.
@@ -157,6 +159,10 @@ const DONE_TEXTS: &[(&str, &str)] = &[
     ("unfrozen", "The boards of the stage show everything again."),
     ("final-day", "The final day has started."),
     ("signed-off", "The stage is signed off."),
+    (
+        "password-set",
+        "Password changed. Your other sessions and tokens no longer work.",
+    ),
     ("stage-made", "The stage was created."),
     ("stage-changed", "The stage was changed."),
     ("team-changed", "The team was changed."),

@@ -1,6 +1,6 @@
 //! The frame of every page (header, navigation and footer), and the rendering of pages and of problems.
 
-use super::assets;
+use super::{assets, signed_in::SignedIn};
 use askama::Template;
 use axum::{
     http::{HeaderValue, header},
@@ -29,6 +29,8 @@ pub(super) struct Frame {
     pub(super) script: &'static str,
     pub(super) icon: &'static str,
     has_tournaments: bool,
+    /// The signed-in user; `None` for visitors.
+    pub(super) signed_in: Option<SignedIn>,
     /// What agents do in this competition; `None` on pages that are the same for all competitions.
     pub(super) subject: Option<String>,
     /// Address of the picture on cards that show a link; `None` if the public address of the server is not configured.
@@ -80,6 +82,7 @@ impl Frame {
             script: assets::SCRIPT.url(),
             icon: assets::ICON.url(),
             has_tournaments: false,
+            signed_in: SignedIn::current(),
             subject: None,
             card_image: None,
         }
@@ -101,7 +104,6 @@ impl Frame {
             ("/season", "Season"),
             ("/announcements", "Announcements"),
             ("/docs", "Docs"),
-            ("/account", "Account"),
         ])
     }
 

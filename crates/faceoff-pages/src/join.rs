@@ -2,7 +2,7 @@
 
 use super::{
     frame::{Frame, PageProblem, render},
-    sign_in::redirect_to_account,
+    sign_in::redirect_to_dashboard,
 };
 use askama::Template;
 use axum::{
@@ -165,7 +165,7 @@ pub(super) async fn page(
     page_with(&app, &code, Form::default(), None).await
 }
 
-/// Joins and redirects to the account, or shows an error on the same page.
+/// Joins and redirects to the dashboard, or shows an error on the same page.
 pub(super) async fn submit(
     State(app): State<App>,
     PathParam(code): PathParam<String>,
@@ -215,5 +215,5 @@ async fn accept_invitation(
     };
     let until = session_expiry(app.config.clock.now());
     let (_, secret) = join(app, request, TokenKind::Session, Some(until), client).await?;
-    redirect_to_account(app, secret.as_str())
+    redirect_to_dashboard(app, secret.as_str())
 }

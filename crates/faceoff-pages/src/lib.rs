@@ -12,6 +12,7 @@ mod board_status;
 mod chart;
 mod comparison;
 mod compressed_text;
+mod countdown;
 mod csv_downloads;
 mod dashboard;
 mod dashboard_frame;
@@ -21,6 +22,7 @@ mod embeddable;
 mod episode_text;
 mod episodes;
 mod evaluation;
+mod expired_session;
 mod feed;
 mod figures;
 mod form_file;
@@ -31,6 +33,7 @@ mod head_to_head;
 mod help;
 mod highlight;
 mod join;
+mod kept_form;
 mod not_found;
 mod organiser;
 mod page_auth;
@@ -43,6 +46,7 @@ mod robots;
 mod season;
 mod side_by_side;
 mod sign_in;
+mod signed_in;
 mod spoilers;
 mod submission_row;
 mod table_drawing;
@@ -54,6 +58,7 @@ mod violation_map;
 
 pub use embeddable::Embeddable;
 pub use not_found::{method_not_allowed, path_not_found, problem_response};
+pub use signed_in::identify_viewer;
 pub use spoilers::SPOILERS_PATH;
 
 use axum::{
@@ -68,7 +73,7 @@ use std::{sync::Arc, time::Duration};
 
 /// All pages and their assets. `time_limit` is the longest time of a request; `api` is the API's
 /// OpenAPI document, which the documentation shows.
-pub fn router(time_limit: Duration, api: Arc<Value>) -> Router<App> {
+pub fn router(app: &App, time_limit: Duration, api: Arc<Value>) -> Router<App> {
     Router::new()
         .route("/", get(board::overall))
         .route("/tasks/{task}", get(board::by_task))
@@ -128,6 +133,10 @@ pub fn router(time_limit: Duration, api: Arc<Value>) -> Router<App> {
         .route("/robots.txt", get(robots::robots))
         .merge(docs::router(api))
         .merge(assets::router())
+        .layer(middleware::from_fn_with_state(
+            Arc::clone(app),
+            expired_session::keep_form,
+        ))
         .layer(middleware::from_fn_with_state(
             time_limit,
             timeouts::time_out,

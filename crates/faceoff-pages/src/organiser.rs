@@ -1,6 +1,7 @@
 //! `/organiser`: the organiser dashboard, the pages with which organisers run a season.
 
 mod attention;
+mod checklist;
 mod day;
 mod decision;
 mod decision_page;
@@ -13,7 +14,7 @@ mod storage;
 mod teams;
 mod workers;
 
-use super::dashboard::access;
+use super::dashboard::{access, settings};
 use axum::{
     Router,
     routing::{get, post},
@@ -48,4 +49,5 @@ pub(super) fn router() -> Router<App> {
             get(decision_page::page).post(decision_page::submit),
         )
         .merge(access::router("/organiser"))
+        .merge(settings::router("/organiser"))
 }

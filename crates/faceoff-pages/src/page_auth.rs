@@ -37,9 +37,7 @@ pub(super) enum AuthRejection {
 impl IntoResponse for AuthRejection {
     fn into_response(self) -> Response {
         match self {
-            Self::SignIn(next) => {
-                Redirect::to(&with_query("/sign-in", &[("next", next)])).into_response()
-            }
+            Self::SignIn(next) => redirect_to_sign_in_for(&next),
             Self::Problem(problem) => PageProblem::from(problem).into_response(),
         }
     }
@@ -66,6 +64,29 @@ pub(super) fn return_path_below<'a>(allowed: &[&str], path: &'a str) -> Option<&
     (is_plain && is_allowed).then_some(path)
 }
 
+/// `path` if it is one to which a dashboard's form may be sent, of which forms of an expired session are kept.
+pub(super) fn form_path(path: &str) -> Option<&str> {
+    return_path_below(&["/dashboard", "/organiser"], path)
+}
+
+/// The page of a dashboard that has the form which is sent to `path`: the dashboard's, since not every form's path is also a page.
+pub(super) fn form_page(path: &str) -> &'static str {
+    let dashboard = RETURN_PATHS
+        .iter()
+        .find(|prefix| path.starts_with(**prefix));
+    dashboard.map_or("/dashboard", |path| *path)
+}
+
+/// Redirects to the sign-in page and back to `target`.
+fn redirect_to_sign_in_for(target: &str) -> Response {
+    Redirect::to(&with_query("/sign-in", &[("next", target)])).into_response()
+}
+
+/// Redirects the sender of a form, which was sent to `path`, to the sign-in page and back to the dashboard.
+pub(super) fn redirect_to_sign_in(path: &str) -> Response {
+    redirect_to_sign_in_for(form_page(path))
+}
+
 /// Target after signing in: the requested page; for a form, the dashboard it belongs to.
 fn target_after_sign_in(parts: &Parts) -> String {
     let path = parts.uri.path();
@@ -73,10 +94,7 @@ fn target_after_sign_in(parts: &Parts) -> String {
         let whole = parts.uri.path_and_query();
         return whole.map_or(path, |whole| whole.as_str()).to_owned();
     }
-    let dashboard = RETURN_PATHS
-        .iter()
-        .find(|prefix| path.starts_with(**prefix));
-    dashboard.map_or("/dashboard", |path| *path).to_owned()
+    form_page(path).to_owned()
 }
 
 impl FromRequestParts<App> for PageUser {

@@ -75,7 +75,7 @@ pub(super) struct Still {
 }
 
 impl Still {
-    fn new(motion: &Clip, observed: Option<&Clip>) -> Self {
+    pub(super) fn new(motion: &Clip, observed: Option<&Clip>) -> Self {
         let [puck, mallet] = [motion.puck_positions(), motion.mallet_positions(0)];
         let contacts = motion.header.contacts.iter();
         let contacts: Vec<[f64; 2]> = contacts.map(|contact| [contact.x, contact.y]).collect();

@@ -11,7 +11,7 @@ use faceoff_service::{
     auth::Caller,
     extract::{Json as Body, PathParam},
     network::ClientNetwork,
-    problem::{Problem, ProblemKind},
+    problem::Problem,
     services::users,
     views::{credentials, user},
 };
@@ -80,40 +80,6 @@ pub(crate) async fn set_password(
     PathParam(id): PathParam<UserId>,
     Body(request): Body<NewPassword>,
 ) -> Result<Json<ChangedAccessView>, Problem> {
-    let user = users::find(&app, &caller, id).await?;
-    if caller
-        .user()
-        .is_none_or(|calling_user| calling_user.id != id)
-    {
-        return Err(Problem::new(
-            ProblemKind::Forbidden,
-            format!(
-                "only the user can set their password; create a link for “{}” instead (POST /api/v1/invitations with the \
-                 role “return”)",
-                user.name
-            ),
-        ));
-    }
-    let now = app.config.clock.now();
-    let stored_hash = app.store.password_hash_of(user.name.as_str()).await?;
-    if stored_hash.is_some() {
-        let old_password = request.old.unwrap_or_default();
-        let name = user.name.as_str();
-        let verified = app
-            .passwords
-            .verify(name, stored_hash, old_password, client, now);
-        if verified.await? != Some(id) {
-            return Err(Problem::new(
-                ProblemKind::Forbidden,
-                "old: expected the current password, got another one; nothing was changed",
-            ));
-        }
-    }
-    let hash = app.passwords.hash(request.password, client).await?;
-    let changed = app
-        .store
-        .set_password(caller.actor(), id, &hash, caller.token.id, now)
-        .await?;
-    tracing::info!(user = %id, "password set");
+    let changed = users::set_password(&app, &caller, id, request, client).await?;
     Ok(changed_access(changed, &app))
 }

@@ -54,6 +54,8 @@ pub struct AppState {
     pub(crate) board_rows: SharedCache<RowsKey, Vec<AggregatedRow>>,
     /// Responses that are the same for all visitors.
     pub answer_cache: AnswerCache,
+    /// Number of pending decisions of the organisers, which the navigation of their pages shows.
+    pub pending_decisions: PendingDecisionsCache,
     /// Ratings of the submissions of a tournament.
     pub(crate) ratings: TournamentAnswers<Ratings>,
     /// Analyses of games by the artifact key of the game's clips, which never change.
@@ -102,6 +104,9 @@ const MAX_HIGHLIGHTS: u64 = 20;
 /// some hundred.
 const MAX_ANALYSIS_BYTES: u64 = 16 << 20;
 
+/// A number of pending decisions by the number of changes of the season and the current minute: stages close without a change.
+pub type PendingDecisionsCache = SharedCache<(u64, i64), usize>;
+
 /// Answers about a tournament by the newest change of the season that they include.
 type TournamentAnswers<T> = SharedCache<(i64, TournamentId), T>;
 
@@ -119,6 +124,7 @@ impl AppState {
             summaries: Summaries::new(store.clone(), Arc::clone(config.competition())),
             board_rows: SharedCache::with_entries(MAX_BOARDS),
             answer_cache: answer_cache::new(),
+            pending_decisions: SharedCache::with_entries(1),
             ratings: SharedCache::with_entries(MAX_TOURNAMENTS),
             game_analyses: SharedCache::with_bytes(MAX_ANALYSIS_BYTES, GameAnalysis::memory_bytes),
             highlights: SharedCache::with_entries(MAX_HIGHLIGHTS),

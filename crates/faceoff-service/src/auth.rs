@@ -2,18 +2,18 @@
 //! member), an API client with a team's token, or the *host*: the operator of the server, who has access to its data folder.
 
 use crate::{
-    app::App,
+    app::{App, AppState},
     boxed,
     change_quota::{self, RemainingChangesSlot},
     credential::Credential,
     places::Precedence,
     problem::{Problem, ProblemKind},
     recent_callers::RecentCaller,
-    request_log,
+    request_log, session,
 };
 use axum::{
     extract::FromRequestParts,
-    http::{header, request::Parts},
+    http::{HeaderMap, header, request::Parts},
 };
 use faceoff_api::token::hash_token;
 use faceoff_store::{
@@ -204,6 +204,30 @@ impl TeamCaller {
     ) -> Result<T, Problem> {
         self.caller.visible(kind, resource, team)
     }
+}
+
+/// The caller of a browser's session, for what every page shows of its viewer; `None` for visitors. It neither counts nor records
+/// the request, since the handler of the page does.
+///
+/// # Errors
+/// `Internal`: the database cannot be read.
+#[boxed]
+pub async fn session_caller(
+    app: &AppState,
+    headers: &HeaderMap,
+) -> Result<Option<Caller>, Problem> {
+    let Some(secret) = session::session_cookie(&app.config, headers) else {
+        return Ok(None);
+    };
+    let secret_hash = hash_token(secret);
+    let now = app.config.clock.now();
+    let verified = app
+        .store
+        .verify_token(secret_hash, TokenKind::Session, now)
+        .await?;
+    Ok(verified
+        .ok()
+        .map(|VerifiedToken { token, principal }| Caller::new(token, secret_hash, principal)))
 }
 
 #[boxed]

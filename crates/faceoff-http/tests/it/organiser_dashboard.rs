@@ -35,7 +35,7 @@ async fn open_decision(grace: &mut Browser<'_>, path: &str, decision: &str) -> (
 }
 
 /// Pages of the organiser dashboard.
-const PAGES: [&str; 10] = [
+const PAGES: [&str; 11] = [
     "/organiser",
     "/organiser/day",
     "/organiser/teams",
@@ -45,6 +45,7 @@ const PAGES: [&str; 10] = [
     "/organiser/workers",
     "/organiser/access",
     "/organiser/log",
+    "/organiser/settings",
     "/organiser/decide/pause",
 ];
 
@@ -62,8 +63,8 @@ async fn organiser_dashboard_is_for_organisers_only() {
         assert!(
             redirect_target(&visitor.open(path).await).starts_with("/sign-in?next=%2Forganiser")
         );
-        // The access page exists for members, too: it shows their own users and tokens.
-        if path != "/organiser/access" {
+        // These pages exist for members, too, with their own users, tokens and settings.
+        if !["/organiser/access", "/organiser/settings"].contains(&path) {
             let refused = ada.open(path).await;
             assert_eq!(refused.status, 403, "{path}");
             assert!(
@@ -656,4 +657,123 @@ async fn log_entries_link_to_their_kind_and_actor() {
     let wrong = grace.open("/organiser/log?actor=unknown").await;
     let html = dashboard_page(&wrong, 422);
     assert!(texts(&html, "[role=alert]")[0].contains("expected organiser"));
+}
+
+#[tokio::test]
+async fn first_steps_are_listed_until_the_season_runs() {
+    let site = Site::start().await;
+    let mut grace = grace(&site).await;
+    let mut steps = async || {
+        let html = dashboard_page(&grace.open("/organiser").await, 200);
+        (
+            texts(&html, ".checklist .done-step").len(),
+            texts(&html, ".checklist li").len(),
+            texts(&html, ".checklist strong").first().cloned(),
+        )
+    };
+    // The season has a name, and its first stage is open.
+    assert_eq!(steps().await, (2, 6, Some("Invite a team".to_owned())));
+    let team = site.team("Alpha").await;
+    let first = "Get the first valid submission".to_owned();
+    assert_eq!(steps().await, (3, 6, Some(first)));
+    site.valid_submission(&team, "agent").await;
+    let day = "Start the first evaluation day".to_owned();
+    assert_eq!(steps().await, (4, 6, Some(day)));
+    site.start_day().await;
+    let results = "See the first results on the board".to_owned();
+    assert_eq!(steps().await, (5, 6, Some(results)));
+    site.finish_evaluation(&result([0.5; 3], 10.0)).await;
+    assert_eq!(steps().await, (0, 0, None));
+}
+
+#[tokio::test]
+async fn log_is_sentences_with_names() {
+    let site = Site::start().await;
+    let [alpha, _] = [site.team("Alpha").await, site.team("Beta").await];
+    site.valid_submission(&alpha, "agent").await;
+    let mut grace = grace(&site).await;
+    site.start_day().await;
+    let disqualify = format!("/organiser/decide/disqualify/{}", alpha.id);
+    let fields = [("reason", "it read the <b>seed</b>"), ("confirm", "Alpha")];
+    redirect_target(&grace.submit(&disqualify, &fields).await);
+    let html = dashboard_page(&grace.open("/organiser/log").await, 200);
+    let rows = texts(&html, "tbody tr").join("\n");
+    for sentence in [
+        "Grace disqualified Alpha: it read the <b>seed</b>",
+        "Grace joined as an organiser",
+        "The host’s administrator created the team Beta",
+        "Alpha’s submission valid: agent “agent”",
+        "queued Alpha’s evaluation of 2026-03-01",
+    ] {
+        assert!(rows.contains(sentence), "{sentence} is not in {rows}");
+    }
+    let authors = texts(&html, "select[name=actor] option");
+    assert!(authors.contains(&"Grace".to_owned()) && authors.contains(&"Alpha (team)".to_owned()));
+}
+
+#[tokio::test]
+async fn stage_form_takes_times_in_the_stages_zone() {
+    let site = Site::start().await;
+    site.change_first_stage(json!({ "zone": "Asia/Tokyo", "closes_at": "2026-04-01T03:00:00Z" }))
+        .await
+        .json(200);
+    let mut grace = grace(&site).await;
+    let stage = site.stage().await;
+    let path = format!("/organiser/stages/{stage}");
+    let page = grace.open(&path).await;
+    let html = dashboard_page(&page, 200);
+    let label = texts(&html, "label[for=closes_at]").remove(0);
+    assert!(label.contains("time zone Asia/Tokyo"), "{label}");
+    let form = forms(&path, &page)
+        .into_iter()
+        .find(|form| form.is_post && form.action == path)
+        .unwrap();
+    let shown = ("closes_at".to_owned(), "2026-04-01T12:00".to_owned());
+    assert!(form.fields.contains(&shown), "{form:?}");
+    let fields: Vec<(&str, &str)> = form
+        .fields
+        .iter()
+        .map(|(name, value)| match name.as_str() {
+            "closes_at" => ("closes_at", "2026-04-02T12:00"),
+            name => (name, value.as_str()),
+        })
+        .collect();
+    let changed = grace.submit(&path, &fields).await;
+    assert!(redirect_target(&changed).ends_with("done=stage-changed"));
+    let view = site.get(&format!("/api/v1/stages/{stage}"), None).await;
+    assert_eq!(view.json(200)["closes_at"], "2026-04-02T03:00:00Z");
+}
+
+#[tokio::test]
+async fn announcement_sent_twice_is_published_once() {
+    let site = Site::start().await;
+    let mut grace = grace(&site).await;
+    let news = [("title", "News"), ("text", "No day\r\non Sunday.")];
+    for _ in 0..2 {
+        let sent = grace.submit("/organiser/messages", &news).await;
+        assert_eq!(redirect_target(&sent), "/organiser/messages?done=announced");
+    }
+    let all = site.get("/api/v1/announcements", None).await.json(200);
+    assert_eq!(all.as_array().unwrap().len(), 1, "{all}");
+}
+
+#[tokio::test]
+async fn day_has_one_primary_action() {
+    let site = Site::start().await;
+    let mut grace = grace(&site).await;
+    let mut primary = async || {
+        let html = dashboard_page(&grace.open("/organiser/day").await, 200);
+        texts(&html, ".primary-action")
+    };
+    assert_eq!(primary().await, ["Start today’s evaluation"]);
+    let pause = json!({ "reason": "a test" });
+    site.post("/api/v1/queue/pause", Some(ADMIN), &pause)
+        .await
+        .json(200);
+    assert_eq!(primary().await, ["Resume the queue"]);
+    site.post("/api/v1/queue/resume", Some(ADMIN), &json!({}))
+        .await
+        .json(200);
+    site.start_day().await;
+    assert!(primary().await.is_empty());
 }

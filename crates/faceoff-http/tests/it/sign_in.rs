@@ -1,7 +1,8 @@
 //! Tests of the pages to join (by an invitation's link), register and sign in, with a browser without scripts.
 
 use crate::{
-    browser::{Browser, PASSWORD, first_text, invite},
+    browser::{Browser, PASSWORD, first_text, forms, invite},
+    html::{links, texts},
     site::{ADMIN, Site, string},
 };
 use scraper::{Html, Selector};
@@ -39,7 +40,7 @@ async fn user_joins_by_link_signs_out_and_signs_in() {
     let joined = browser.submit(&link, &fields).await;
     assert_eq!(
         (joined.status.as_u16(), joined.header("location")),
-        (303, "/account")
+        (303, "/dashboard")
     );
     let account = browser.open("/account").await;
     assert_eq!(first_text(&account, "h1"), "Ada");
@@ -57,7 +58,7 @@ async fn user_joins_by_link_signs_out_and_signs_in() {
     assert_eq!(browser.cookie, None);
     assert_eq!(
         browser.open("/account").await.header("location"),
-        "/sign-in"
+        "/sign-in?next=%2Faccount"
     );
     let wrong = browser
         .submit("/sign-in", &[("name", "Ada"), ("password", "wrong")])
@@ -67,7 +68,7 @@ async fn user_joins_by_link_signs_out_and_signs_in() {
     let signed_in = browser
         .submit("/sign-in", &[("name", "ada"), ("password", PASSWORD)])
         .await;
-    assert_eq!(signed_in.header("location"), "/account");
+    assert_eq!(signed_in.header("location"), "/dashboard");
     assert_eq!(browser.open("/organiser/log").await.status, 403);
 }
 
@@ -161,7 +162,7 @@ async fn registration_link_shows_its_status() {
     ];
     assert_eq!(
         browser.submit(&link, &fields).await.header("location"),
-        "/account"
+        "/dashboard"
     );
 }
 
@@ -198,4 +199,148 @@ async fn founder_names_the_team_and_foreign_forms_are_refused() {
     assert_eq!(browser.submit(&link, &valid).await.status, 303);
     let account = browser.open("/account").await;
     assert!(account.body.contains("Alpha"));
+}
+
+#[tokio::test]
+async fn navigation_names_user_and_pending_decisions() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let role = json!({ "role": "member", "team": team.id, "note": "Ada" });
+    let mut ada = Browser::join(&site, "Ada <b>", role).await;
+    let role = json!({ "role": "organiser", "note": "Grace" });
+    let mut grace = Browser::join(&site, "Grace", role).await;
+    let mut visitor = Browser::new(&site);
+    let entries = "header nav li";
+    // A visitor's page is the same for all, and has no names.
+    for path in ["/", "/season", "/docs", "/no-such-page"] {
+        let page = Html::parse_document(&visitor.open(path).await.body);
+        assert_eq!(texts(&page, entries).last().unwrap(), "Account", "{path}");
+        let page = Html::parse_document(&ada.open(path).await.body);
+        let own = texts(&page, entries);
+        assert_eq!(own[own.len() - 2..], ["Dashboard", "Ada <b>"], "{path}");
+        assert!(links(&page, "header nav a").contains(&"/dashboard".to_owned()));
+        let page = Html::parse_document(&grace.open(path).await.body);
+        let own = texts(&page, entries);
+        assert_eq!(own[own.len() - 2..], ["Dashboard", "Grace"], "{path}");
+        assert!(links(&page, "header nav a").contains(&"/organiser".to_owned()));
+    }
+    let open = json!({ "takes_registrations": true });
+    site.patch("/api/v1/season", Some(ADMIN), &open)
+        .await
+        .json(200);
+    let fields = [("team_name", "Beta"), ("contact", "ben at example.org")];
+    assert_eq!(visitor.submit("/register", &fields).await.status, 201);
+    ada.submit("/dashboard/questions", &[("text", "When?")])
+        .await;
+    let badge = async |browser: &mut Browser<'_>| {
+        let page = Html::parse_document(&browser.open("/season").await.body);
+        texts(&page, ".badge")
+    };
+    assert_eq!(badge(&mut grace).await, ["2 pending decisions"]);
+    assert!(badge(&mut ada).await.is_empty());
+    assert!(badge(&mut visitor).await.is_empty());
+    let question = site.get("/api/v1/questions", Some(ADMIN)).await.json(200);
+    let answer = format!("/organiser/messages/{}", string(&question[0]["id"]));
+    grace.submit(&answer, &[("text", "Soon.")]).await;
+    assert_eq!(badge(&mut grace).await, ["1 pending decisions"]);
+    // The same board has different tags for different viewers, who thus never get each other's page.
+    let tag = |answer: crate::site::Answer| answer.header("etag").to_owned();
+    let tags = [
+        tag(visitor.open("/").await),
+        tag(ada.open("/").await),
+        tag(grace.open("/").await),
+    ];
+    assert!(tags[0] != tags[1] && tags[1] != tags[2] && tags[0] != tags[2]);
+}
+
+#[tokio::test]
+async fn expired_session_keeps_the_typed_form() {
+    let site = Site::start().await;
+    let role = json!({ "role": "organiser", "note": "Grace" });
+    let mut grace = Browser::join(&site, "Grace", role).await;
+    // Another browser's session ends.
+    let expired = "faceoff_session=fo_session_0000";
+    grace.cookie = Some(expired.to_owned());
+    let text = "Line <1>\r\nline \"2\"";
+    let typed = [
+        ("title", "No day on Sunday"),
+        ("text", text),
+        ("password", "my secret"),
+        ("confirm", "yes"),
+    ];
+    let asked = grace.submit("/organiser/messages", &typed).await;
+    assert_eq!(asked.status, 401);
+    assert!(first_text(&asked, "[role=alert]").contains("What you typed is kept"));
+    assert!(!asked.body.contains("my secret"), "{}", asked.body);
+    let sign_in = forms("/organiser/messages", &asked)
+        .into_iter()
+        .find(|form| form.action == "/sign-in")
+        .unwrap();
+    let send = async |browser: &mut Browser<'_>, password: &str| {
+        let fields: Vec<(&str, &str)> = sign_in
+            .fields
+            .iter()
+            .map(|(name, value)| match name.as_str() {
+                "name" => ("name", "Grace"),
+                "password" => ("password", password),
+                name => (name, value.as_str()),
+            })
+            .collect();
+        browser.submit("/sign-in", &fields).await
+    };
+    // A wrong password loses nothing either.
+    let wrong = send(&mut grace, "wrong").await;
+    assert_eq!(wrong.status, 401);
+    let still = forms("/sign-in", &wrong).remove(0);
+    let kept = ("kept.title".to_owned(), "No day on Sunday".to_owned());
+    assert!(still.fields.contains(&kept), "{still:?}");
+
+    let signed_in = send(&mut grace, PASSWORD).await;
+    assert_eq!(signed_in.status, 200);
+    assert_ne!(grace.cookie.as_deref(), Some(expired));
+    let form = forms("/sign-in", &signed_in)
+        .into_iter()
+        .find(|form| form.action == "/organiser/messages")
+        .unwrap();
+    let names: Vec<&str> = form.fields.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(names, ["title", "text"]);
+    let announcements = site.get("/api/v1/announcements", None).await.json(200);
+    assert_eq!(announcements, json!([]), "nothing is sent by signing in");
+    let fields: Vec<(&str, &str)> = form
+        .fields
+        .iter()
+        .map(|(name, value)| (name.as_str(), value.as_str()))
+        .collect();
+    let sent = grace.submit(&form.action, &fields).await;
+    assert_eq!(
+        sent.header("location"),
+        "/organiser/messages?done=announced"
+    );
+    let announcements = site.get("/api/v1/announcements", None).await.json(200);
+    assert_eq!(announcements[0]["title"], "No day on Sunday");
+    assert_eq!(announcements[0]["text"], "Line <1>\nline \"2\"");
+}
+
+#[tokio::test]
+async fn form_of_another_site_is_not_kept() {
+    let site = Site::start().await;
+    let mut browser = Browser::new(&site);
+    let form = crate::browser::Form {
+        action: "/organiser/messages".to_owned(),
+        is_post: true,
+        is_multipart: false,
+        fields: vec![("title".to_owned(), "evil title".to_owned())],
+    };
+    for answer in browser.submit_from_foreign_page(&form).await {
+        assert!(!answer.body.contains("evil title"), "{}", answer.body);
+    }
+    // A form that was kept leads to no other site either.
+    let fields = [("form", "https://evil.example/organiser"), ("kept.a", "b")];
+    let role = json!({ "role": "organiser", "note": "Grace" });
+    drop(Browser::join(&site, "Grace", role).await);
+    let mut all = vec![("name", "Grace"), ("password", PASSWORD)];
+    all.extend(fields);
+    let signed_in = browser.submit("/sign-in", &all).await;
+    assert_eq!(signed_in.header("location"), "/dashboard");
+    assert!(!signed_in.body.contains("evil"));
 }

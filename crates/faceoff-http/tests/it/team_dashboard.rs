@@ -233,8 +233,13 @@ async fn visitor_is_redirected_to_sign_in_and_back() {
             format!("/sign-in?next={next}")
         );
     }
+    // What was typed into a form is kept; a form without texts leads back to the dashboard.
     let sent = browser
         .submit("/dashboard/access/tokens", &[("name", "a")])
+        .await;
+    assert_eq!(sent.status, 401);
+    let sent = browser
+        .submit("/dashboard/access/tokens", &[("name", "")])
         .await;
     assert_eq!(sent.header("location"), "/sign-in?next=%2Fdashboard");
     let sent = browser.upload("/dashboard/upload", "a.zip", &GZIP).await;
@@ -263,7 +268,7 @@ async fn visitor_is_redirected_to_sign_in_and_back() {
     ] {
         let fields = [fields[0], fields[1], ("next", evil)];
         let signed_in = browser.submit("/sign-in", &fields).await;
-        assert_eq!(signed_in.header("location"), "/account");
+        assert_eq!(signed_in.header("location"), "/dashboard");
     }
 }
 
@@ -488,4 +493,100 @@ async fn dashboard_lists_evaluations_with_their_files() {
     );
     let bundle = links(&html, "a[href$='/bundle']").remove(0);
     assert_eq!(ada.open(&bundle).await.status, 200);
+}
+
+#[tokio::test]
+async fn dashboard_shows_rank_tasks_and_next_cutoff() {
+    let site = Site::start_with_schedule("12:00").await;
+    site.ranked_teams(&[
+        ("Alpha", result([0.9; 3], 10.0)),
+        ("Beta", result([0.5, 0.25, 0.0], 10.0)),
+    ])
+    .await;
+    let teams = site.get("/api/v1/teams", None).await.json(200);
+    let beta = teams.as_array().unwrap().iter();
+    let beta = beta.clone().find(|team| team["name"] == "Beta").unwrap();
+    let role = json!({ "role": "member", "team": beta["id"], "note": "Ben" });
+    let mut ben = Browser::join(&site, "Ben", role).await;
+    let html = dashboard_page(&ben.open("/dashboard").await, 200);
+    let tiles = texts(&html, "section[aria-labelledby=result] .tiles dd");
+    assert_eq!(tiles[0], "2 of 2");
+    let tasks = texts(&html, ".task-bars dd .figure");
+    assert_eq!(tasks, ["50.0 %", "25.0 %", "0.0 %"]);
+    let bars = Selector::parse(".task-bars svg.bar").unwrap();
+    assert_eq!(html.select(&bars).count(), 3);
+    let countdown = Selector::parse("[data-countdown]").unwrap();
+    let countdown = html.select(&countdown).next().unwrap();
+    let at: jiff::Timestamp = countdown.attr("data-countdown").unwrap().parse().unwrap();
+    assert!(at > site.now());
+    let text: String = countdown.text().collect();
+    assert!(text.starts_with("in "), "{text}");
+    assert!(texts(&html, ".failed-episodes").is_empty(), "no replays");
+}
+
+#[tokio::test]
+async fn member_changes_password_and_team() {
+    const NEW_PASSWORD: &str = "a whole new password";
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let mut ada = member(&site, &team, "Ada").await;
+    let page = dashboard_page(&ada.open("/dashboard/settings").await, 200);
+    assert_eq!(texts(&page, "h2"), ["Password", "Team"]);
+    let set = async |ada: &mut Browser<'_>, old: &str, new: &str| {
+        let fields = [("old_password", old), ("new_password", new)];
+        ada.submit("/dashboard/settings/password", &fields).await
+    };
+    let wrong = set(&mut ada, "wrong", NEW_PASSWORD).await;
+    assert!(first_text(&wrong, "[role=alert]").contains("expected the current password"));
+    assert!(!wrong.body.contains(NEW_PASSWORD));
+    dashboard_page(&set(&mut ada, PASSWORD, "short").await, 422);
+    let changed = set(&mut ada, PASSWORD, NEW_PASSWORD).await;
+    assert_eq!(
+        redirect_target(&changed),
+        "/dashboard/settings?done=password-set"
+    );
+    let mut other = Browser::new(&site);
+    let sign_in = |password| [("name", "Ada"), ("password", password)];
+    let old = other.submit("/sign-in", &sign_in(PASSWORD)).await;
+    assert_eq!(old.status, 401);
+    let new = other.submit("/sign-in", &sign_in(NEW_PASSWORD)).await;
+    assert_eq!(redirect_target(&new), "/dashboard");
+
+    let fields = [
+        ("team_name", "Alpha Two"),
+        ("affiliation", "TU"),
+        ("link", ""),
+    ];
+    let renamed = ada.submit("/dashboard/settings/team", &fields).await;
+    assert_eq!(
+        redirect_target(&renamed),
+        "/dashboard/settings?done=team-changed"
+    );
+    let view = site.get(&format!("/api/v1/teams/{}", team.id), None).await;
+    let view = view.json(200);
+    assert_eq!(
+        (&view["name"], &view["affiliation"]),
+        (&json!("Alpha Two"), &json!("TU"))
+    );
+    let fields = [fields[0], fields[1], ("link", "ftp://x")];
+    let refused = ada.submit("/dashboard/settings/team", &fields).await;
+    let html = dashboard_page(&refused, 422);
+    assert!(texts(&html, "[role=alert]")[0].contains("https://"));
+    assert!(
+        refused.body.contains("value=\"ftp://x\""),
+        "the form is kept"
+    );
+}
+
+#[tokio::test]
+async fn question_sent_twice_is_asked_once() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let mut ada = member(&site, &team, "Ada").await;
+    for text in ["When\r\nis it?", "When\r\nis it?", "Where?"] {
+        let asked = ada.submit("/dashboard/questions", &[("text", text)]).await;
+        assert_eq!(redirect_target(&asked), "/dashboard/questions?done=asked");
+    }
+    let questions = site.get("/api/v1/questions", Some(ADMIN)).await.json(200);
+    assert_eq!(questions.as_array().unwrap().len(), 2, "{questions}");
 }

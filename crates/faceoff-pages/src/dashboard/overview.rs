@@ -1,10 +1,16 @@
 //! `/dashboard`: next evaluation, upload, submissions and latest evaluations of a team.
 
-use super::evaluations::{self, EvaluationRow};
+use super::{
+    evaluations::{self, EvaluationRow},
+    games::{self, TeamTournament},
+    last_result::{self, LastResult},
+};
 use crate::{
+    assets, countdown,
     dashboard_frame::{self, DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
     frame::{Frame, PageProblem},
     page_auth::{PageMember, PageUser},
+    spoilers::Spoilers,
     submission_row::SubmissionRow,
 };
 use askama::Template;
@@ -21,6 +27,7 @@ use faceoff_service::{
     views::{me, submission},
 };
 use faceoff_types::EvaluationId;
+use jiff::Timestamp;
 use serde::Deserialize;
 
 /// Number of submissions and evaluations in the lists; older submissions are folded.
@@ -32,7 +39,13 @@ struct Page {
     frame: Frame,
     head: DashboardHeader,
     me: MeView,
+    /// Style of the drawings of episodes.
+    episodes_style: &'static str,
     next_cutoff: Option<String>,
+    /// The time of the next cutoff, if a schedule fixes it, and how long it takes until then.
+    countdown: Option<(Timestamp, String)>,
+    last_result: Option<LastResult>,
+    tournaments: Vec<TeamTournament>,
     active: Option<SubmissionRow>,
     /// Today's evaluation, with what happens next.
     today: Option<(EvaluationId, String)>,
@@ -50,17 +63,20 @@ pub(super) async fn page(
     PageUser(caller): PageUser,
     State(app): State<App>,
     Query(notice): Query<DoneQuery>,
+    spoilers: Spoilers,
 ) -> Result<Response, PageProblem> {
     if caller.is_organiser() {
         return Ok(Redirect::to("/organiser").into_response());
     }
     let team = faceoff_service::auth::TeamCaller::new(caller.clone())?;
-    page_with(&app, &PageMember { caller, team }, Notice::Done(&notice)).await
+    let member = PageMember { caller, team };
+    page_with(&app, &member, &spoilers, Notice::Done(&notice)).await
 }
 
 pub(super) async fn page_with(
     app: &App,
     member: &PageMember,
+    spoilers: &Spoilers,
     notice: Notice<'_>,
 ) -> Result<Response, PageProblem> {
     let team = &member.team.team;
@@ -76,6 +92,14 @@ pub(super) async fn page_with(
     let page = Page {
         frame: Frame::load(app, "/dashboard").await?,
         head: DashboardHeader::new(&member.caller, "/dashboard", notice),
+        episodes_style: assets::EPISODES_STYLE.url(),
+        countdown: me
+            .next_cutoff
+            .as_ref()
+            .and_then(|next| next.at)
+            .map(|at| (at, countdown::until(at, app.config.clock.now()))),
+        last_result: last_result::of_team(app, team.id).await?,
+        tournaments: games::of_team(app, team.id, spoilers.hides_results()).await?,
         next_cutoff: me.next_cutoff.as_ref().map(ToString::to_string),
         active: active.map(SubmissionRow::from),
         today,
@@ -99,11 +123,12 @@ pub(super) struct TermsForm {
 pub(super) async fn accept_terms(
     member: PageMember,
     State(app): State<App>,
+    spoilers: Spoilers,
     form: Result<PageForm<TermsForm>, Problem>,
 ) -> Result<Response, PageProblem> {
     let PageForm(TermsForm { version }) = form?;
     match users::accept_terms(&app, &member.caller, version).await {
         Ok(_) => Ok(redirect_done("/dashboard", "terms")),
-        Err(problem) => page_with(&app, &member, Notice::Refused(&problem)).await,
+        Err(problem) => page_with(&app, &member, &spoilers, Notice::Refused(&problem)).await,
     }
 }

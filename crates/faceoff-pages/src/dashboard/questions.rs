@@ -53,8 +53,16 @@ pub(super) async fn ask(
     form: Result<PageForm<NewQuestion>, Problem>,
 ) -> Result<Response, PageProblem> {
     let PageForm(form) = form?;
-    match announcements::ask(&app, &member.team, &form).await {
-        Ok(_) => Ok(redirect_done(PATH, "asked")),
+    let team = member.team.team.id;
+    let asked = match announcements::is_open_question(&app, team, &form).await {
+        Ok(false) => announcements::ask(&app, &member.team, &form)
+            .await
+            .map(drop),
+        Ok(true) => Ok(()),
+        Err(problem) => Err(problem),
+    };
+    match asked {
+        Ok(()) => Ok(redirect_done(PATH, "asked")),
         Err(problem) => page_with(&app, &member, Notice::Refused(&problem), form.text).await,
     }
 }

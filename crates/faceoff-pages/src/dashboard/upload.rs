@@ -6,6 +6,7 @@ use crate::{
     form_file::FormFile,
     frame::PageProblem,
     page_auth::PageMember,
+    spoilers::Spoilers,
 };
 use axum::{body::Body, extract::State, http::HeaderMap, response::Response};
 use faceoff_service::{
@@ -44,12 +45,15 @@ async fn receive_bundle(
 pub(super) async fn submit(
     member: PageMember,
     State(app): State<App>,
+    spoilers: Spoilers,
     headers: HeaderMap,
     body: Body,
 ) -> Result<Response, PageProblem> {
     session::check_same_origin(&headers)?;
     match receive_bundle(&app, &member, &headers, body).await {
         Ok(_) => Ok(redirect_done("/dashboard", "uploaded")),
-        Err(problem) => overview::page_with(&app, &member, Notice::Refused(&problem)).await,
+        Err(problem) => {
+            overview::page_with(&app, &member, &spoilers, Notice::Refused(&problem)).await
+        }
     }
 }

@@ -1,5 +1,6 @@
 //! `/organiser`: open tasks of the organisers and the status of the season.
 
+use super::checklist::{self, Step};
 use crate::{
     board_status,
     dashboard_frame::{self, DashboardHeader, DoneQuery, Notice},
@@ -29,6 +30,8 @@ use std::collections::BTreeSet;
 struct Page {
     frame: Frame,
     head: DashboardHeader,
+    /// The steps until the season runs; `None` once all are done.
+    checklist: Option<Vec<Step>>,
     items: Vec<Item>,
     /// Running and queued jobs, if known.
     queue: Option<(u32, u32)>,
@@ -352,6 +355,7 @@ pub(super) async fn page(
     let page = Page {
         frame: Frame::load(&app, path).await?,
         head: DashboardHeader::new(&user.caller, path, Notice::Done(&notice)),
+        checklist: checklist::open_steps(&app).await?,
         items,
         queue,
         slots: queue::slots(&app),

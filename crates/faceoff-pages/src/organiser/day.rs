@@ -60,6 +60,24 @@ struct Page {
     can_void: bool,
 }
 
+impl Page {
+    /// The page of the decision that the day needs most now, with the label of its button.
+    fn primary_action(&self) -> Option<(String, &'static str)> {
+        let StageDay { stage, date } = self.stage_day;
+        if self.paused.is_some() {
+            return Some(("/organiser/decide/resume".to_owned(), "Resume the queue"));
+        }
+        if self.can_start {
+            let path = format!("/organiser/decide/start-day/{stage}");
+            return Some((path, "Start today’s evaluation"));
+        }
+        self.was_missed.then(|| {
+            let path = format!("/organiser/decide/missed-day/{stage}/{date}");
+            (path, "Evaluate this missed day")
+        })
+    }
+}
+
 struct Row {
     id: EvaluationId,
     team: TeamId,

@@ -1,4 +1,7 @@
-//! `/organiser/log`: all changes with their authors.
+//! `/organiser/log`: all changes as sentences with their authors.
+
+mod names;
+mod sentence;
 
 use crate::{
     dashboard_frame::{DashboardHeader, Notice, render_dashboard},
@@ -16,6 +19,8 @@ use faceoff_api::{
     views::event::{EventView, EventsView},
 };
 use faceoff_service::{app::App, extract::QueryParams, problem::Problem, views::event};
+use names::Names;
+use sentence::sentence;
 
 const PATH: &str = "/organiser/log";
 
@@ -24,13 +29,23 @@ const PATH: &str = "/organiser/log";
 struct Page {
     frame: Frame,
     head: DashboardHeader,
-    events: EventsView,
+    entries: Vec<Entry>,
+    next_before: Option<i64>,
+    /// Users and teams: identifier and name.
+    authors: Vec<(String, String)>,
     query: EventsQuery,
+}
+
+/// A line of the log.
+struct Entry {
+    event: EventView,
+    sentence: String,
 }
 
 impl Page {
     fn details(&self, event: &EventView) -> String {
         let fields = event.details.iter();
+        let fields = fields.filter(|(name, _)| *name != "reason");
         fields
             .map(|(name, value)| match value {
                 serde_json::Value::String(text) => format!("{name}: {text}"),
@@ -40,6 +55,11 @@ impl Page {
             .join(" · ")
     }
 
+    /// Is this the chosen author?
+    fn is_chosen(&self, author: &str) -> bool {
+        self.query.actor.as_deref() == Some(author)
+    }
+
     /// Address of the log filtered by a field.
     fn filter_link(&self, field: &str, value: &str) -> String {
         with_query(PATH, &[(field, value)])
@@ -47,7 +67,7 @@ impl Page {
 
     fn older_link(&self) -> Option<String> {
         let older = EventsQuery {
-            before: Some(self.events.next_before?),
+            before: Some(self.next_before?),
             ..self.query.clone()
         };
         Some(with_query(PATH, &older))
@@ -83,10 +103,17 @@ pub(super) async fn page(
         }
     };
     let notice = refused.as_ref().map_or(Notice::None, Notice::Refused);
+    let names = Names::load(&app, &events.events).await?;
+    let entries = events.events.into_iter().map(|event| Entry {
+        sentence: sentence(&event, &names),
+        event,
+    });
     let page = Page {
         frame: Frame::load(&app, PATH).await?,
         head: DashboardHeader::new(&user.caller, PATH, notice),
-        events,
+        entries: entries.collect(),
+        next_before: events.next_before,
+        authors: names.authors(),
         query,
     };
     render_dashboard(&page, notice)

@@ -106,8 +106,15 @@ pub(super) async fn announce(
     form: Result<PageForm<NewAnnouncement>, Problem>,
 ) -> Result<Response, PageProblem> {
     let PageForm(form) = form?;
-    match announcements::announce(&app, user.organiser.actor(), &form).await {
-        Ok(_) => Ok(redirect_done(PATH, "announced")),
+    let announced = match announcements::is_newest(&app, &form).await {
+        Ok(false) => announcements::announce(&app, user.organiser.actor(), &form)
+            .await
+            .map(drop),
+        Ok(true) => Ok(()),
+        Err(problem) => Err(problem),
+    };
+    match announced {
+        Ok(()) => Ok(redirect_done(PATH, "announced")),
         Err(problem) => {
             let values = FormValues {
                 title: form.title,

@@ -13,7 +13,7 @@ use faceoff_api::{
     views::announcement::QuestionView,
 };
 use faceoff_store::{Actor, Announcement, Question, Terms};
-use faceoff_types::QuestionId;
+use faceoff_types::{QuestionId, TeamId};
 
 /// Longest title of an announcement.
 const MAX_TITLE_CHARS: usize = 120;
@@ -35,6 +35,31 @@ pub async fn announce(
     let announcement = app.store.announce(actor, &title, &body, now).await?;
     tracing::info!(announcement = %announcement.id, "announcement published");
     Ok(announcement)
+}
+
+/// Is this the newest announcement already? A form that is sent twice must not publish it twice.
+#[boxed]
+pub async fn is_newest(app: &AppState, new: &NewAnnouncement) -> Result<bool, Problem> {
+    let title = text::single_line("title", &new.title, MAX_TITLE_CHARS)?;
+    let body = text::multi_line("text", &new.text, MAX_TEXT_CHARS)?;
+    let newest = app.store.announcements(1).await?;
+    Ok(newest
+        .first()
+        .is_some_and(|newest| newest.title == title && newest.text == body))
+}
+
+/// Has the team asked this already, without an answer yet? A form that is sent twice must not ask it twice.
+#[boxed]
+pub async fn is_open_question(
+    app: &AppState,
+    team: TeamId,
+    new: &NewQuestion,
+) -> Result<bool, Problem> {
+    let text = text::multi_line("text", &new.text, MAX_QUESTION_CHARS)?;
+    let questions = app.store.questions().await?;
+    Ok(questions.iter().any(|question| {
+        question.team == Some(team) && question.answer.is_none() && question.text == text
+    }))
 }
 
 /// Questions, newest first. Visitors see those with a public answer, teams also their own, organisers all.

@@ -4,8 +4,10 @@ use crate::{
     app::AppState,
     auth::Caller,
     boxed,
+    network::Network,
     problem::{Problem, ProblemKind},
 };
+use faceoff_api::requests::NewPassword;
 use faceoff_store::{EndedCredentials, Principal, StoreError, User};
 use faceoff_types::UserId;
 
@@ -81,4 +83,54 @@ pub async fn accept_terms(app: &AppState, caller: &Caller, version: u32) -> Resu
         .accept_terms(caller.actor(), user.id, version, now)
         .await?;
     Ok(accepted)
+}
+
+/// Sets the caller's own password; the current one is expected, if there is one. Other tokens and sessions of the user are revoked.
+///
+/// # Errors
+/// `Forbidden`: another user, or the current password is wrong; `Invalid`: the new one is too short.
+#[boxed]
+pub async fn set_password(
+    app: &AppState,
+    caller: &Caller,
+    id: UserId,
+    request: NewPassword,
+    client: Option<Network>,
+) -> Result<(User, EndedCredentials), Problem> {
+    let user = find(app, caller, id).await?;
+    if caller
+        .user()
+        .is_none_or(|calling_user| calling_user.id != id)
+    {
+        return Err(Problem::new(
+            ProblemKind::Forbidden,
+            format!(
+                "only the user can set their password; create a link for “{}” instead (POST /api/v1/invitations with the \
+                 role “return”)",
+                user.name
+            ),
+        ));
+    }
+    let now = app.config.clock.now();
+    let stored_hash = app.store.password_hash_of(user.name.as_str()).await?;
+    if stored_hash.is_some() {
+        let old_password = request.old.unwrap_or_default();
+        let name = user.name.as_str();
+        let verified = app
+            .passwords
+            .verify(name, stored_hash, old_password, client, now);
+        if verified.await? != Some(id) {
+            return Err(Problem::new(
+                ProblemKind::Forbidden,
+                "old: expected the current password, got another one; nothing was changed",
+            ));
+        }
+    }
+    let hash = app.passwords.hash(request.password, client).await?;
+    let changed = app
+        .store
+        .set_password(caller.actor(), id, &hash, caller.token.id, now)
+        .await?;
+    tracing::info!(user = %id, "password set");
+    Ok(changed)
 }

@@ -31,6 +31,7 @@ pub mod history;
 pub mod invitation;
 pub mod live_game;
 pub mod me;
+pub mod pending_decisions;
 pub mod proposal;
 pub mod queue;
 pub mod ratings;

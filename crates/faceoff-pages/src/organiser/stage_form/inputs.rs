@@ -4,8 +4,8 @@ use super::texts::StageForm;
 use faceoff_api::requests::{OrNull, StagePatch};
 use faceoff_service::problem::Problem;
 use faceoff_store::Stage;
-use faceoff_types::Schedule;
-use jiff::{Timestamp, civil::DateTime, tz::TimeZone};
+use faceoff_types::{IanaTimeZone, Schedule};
+use jiff::{Timestamp, civil::DateTime};
 use serde_json::{Value, json};
 use std::{fmt::Display, str::FromStr};
 
@@ -26,7 +26,7 @@ pub(in crate::organiser) struct Input {
 pub(in crate::organiser) enum InputKind {
     Text,
     OptionalText,
-    /// In UTC, in the format of an input `datetime-local`: `2026-03-01T10:00`. May be empty.
+    /// In the stage's time zone, in the format of an input `datetime-local`: `2026-03-01T10:00`. May be empty.
     DateTime,
     /// A whole number from this one on.
     Number(u32),
@@ -82,9 +82,9 @@ pub(super) static GROUPS: [InputGroup; 4] = [
             Input {
                 name: "opens_at",
                 label: "Opens",
-                hint: "UTC",
+                hint: "",
                 kind: InputKind::DateTime,
-                text: |stage| datetime_local(stage.opens_at),
+                text: |stage| datetime_local(stage.opens_at, &stage.zone),
                 read: |form, patch| {
                     patch.opens_at = parse_time(form, "opens_at")?;
                     Ok(())
@@ -93,9 +93,13 @@ pub(super) static GROUPS: [InputGroup; 4] = [
             Input {
                 name: "closes_at",
                 label: "Closes",
-                hint: "UTC; empty: no date set",
+                hint: "empty: no date set",
                 kind: InputKind::DateTime,
-                text: |stage| stage.closes_at.map(datetime_local).unwrap_or_default(),
+                text: |stage| {
+                    let closes_at = stage.closes_at;
+                    let text = closes_at.map(|instant| datetime_local(instant, &stage.zone));
+                    text.unwrap_or_default()
+                },
                 read: |form, patch| {
                     patch.closes_at = Some(OrNull(parse_time(form, "closes_at")?));
                     Ok(())
@@ -252,9 +256,10 @@ fn parse_number(form: &StageForm, name: &str, setting: &mut Option<u32>) -> Resu
     Ok(())
 }
 
-/// A time in the format of an input `datetime-local`.
-fn datetime_local(instant: Timestamp) -> String {
-    instant.strftime("%Y-%m-%dT%H:%M").to_string()
+/// A time in the stage's time zone, in the format of an input `datetime-local`.
+fn datetime_local(instant: Timestamp, zone: &IanaTimeZone) -> String {
+    let local = instant.to_zoned(zone.time_zone());
+    local.strftime("%Y-%m-%dT%H:%M").to_string()
 }
 
 fn parse_time(form: &StageForm, name: &str) -> Result<Option<Timestamp>, Problem> {
@@ -263,7 +268,11 @@ fn parse_time(form: &StageForm, name: &str) -> Result<Option<Timestamp>, Problem
         return Ok(None);
     }
     let local: DateTime = text.parse().map_err(|error| invalid_field(name, error))?;
-    let zoned = local.to_zoned(TimeZone::UTC);
+    let zone: IanaTimeZone = form
+        .zone()
+        .parse()
+        .map_err(|error| invalid_field("zone", error))?;
+    let zoned = local.to_zoned(zone.time_zone());
     Ok(Some(
         zoned
             .map_err(|error| invalid_field(name, error))?

@@ -14,6 +14,14 @@ impl StageForm {
         self.0.get(input).map_or("", String::as_str)
     }
 
+    /// Name of the time zone of all times in the form.
+    pub(in crate::organiser) fn zone(&self) -> &str {
+        match self.text("zone").trim() {
+            "" => "UTC",
+            zone => zone,
+        }
+    }
+
     pub(in crate::organiser) fn is_ticked(&self, checkbox: &str) -> bool {
         !self.text(checkbox).is_empty()
     }

@@ -1,0 +1,113 @@
+//! The last result of a team: its rank, a bar for each task, and the worst failed episodes.
+
+use crate::{figures::Rate, replay::page_path, replay_section::Still};
+use faceoff_api::{requests::BoardQuery, views::board::BoardRow};
+use faceoff_replay::EpisodeLine;
+use faceoff_service::{
+    app::App,
+    problem::Problem,
+    viewer::Viewer,
+    views::{board, clips::Clips, visibility::Visibility},
+};
+use faceoff_types::{EvaluationId, Task, TeamId, Tier};
+use jiff::civil::Date;
+use std::cmp::Reverse;
+
+/// Failed episodes on the page.
+const MAX_FAILED: usize = 3;
+
+/// The team's row of the board.
+pub(super) struct LastResult {
+    pub(super) rank: u32,
+    /// Number of ranked teams.
+    pub(super) ranked: usize,
+    pub(super) day: Date,
+    pub(super) evaluation: EvaluationId,
+    pub(super) score: Rate,
+    /// `None` in a competition without tiers.
+    pub(super) tier: Option<Tier>,
+    /// Titles and success rates.
+    pub(super) tasks: Vec<(String, Rate)>,
+    pub(super) failed: Vec<FailedEpisode>,
+}
+
+/// An episode without success.
+pub(super) struct FailedEpisode {
+    pub(super) task: Task,
+    pub(super) episode: u32,
+    /// The page of its replay.
+    pub(super) path: String,
+    pub(super) end_reason: String,
+    /// Number of kinds of violations.
+    pub(super) violations: usize,
+    pub(super) still: Still,
+}
+
+/// The last result of a team in the current stage, as its members may see it; `None` if there is none yet, and for
+/// reference agents, which have no rank.
+pub(super) async fn of_team(app: &App, team: TeamId) -> Result<Option<LastResult>, Problem> {
+    let visibility = Visibility::load(app, Viewer::Team(team)).await?;
+    let board = board::query(app, &visibility, BoardQuery::default(), None).await?;
+    let own = board.rows.iter().find(|row| row.team_id == team);
+    let Some(row) = own else {
+        return Ok(None);
+    };
+    let titles = app.config.competition().tasks.iter();
+    let tasks = titles.filter_map(|info| {
+        let result = row.tasks.get(&info.task)?;
+        Some((info.title.clone(), Rate::new(result)))
+    });
+    Ok(Some(LastResult {
+        rank: row.rank,
+        ranked: board.rows.len(),
+        day: row.day,
+        evaluation: row.evaluation,
+        score: Rate::of_score(row.score, &row.tasks, &board.weights),
+        tier: row.tier,
+        tasks: tasks.collect(),
+        failed: worst_failed(app, &visibility, row).await?,
+    }))
+}
+
+/// The failed episodes with the most violations, then with the most late answers: first the worst one of each task, then others. None
+/// if there are no replays, or none any more.
+async fn worst_failed(
+    app: &App,
+    visibility: &Visibility,
+    row: &BoardRow,
+) -> Result<Vec<FailedEpisode>, Problem> {
+    let clips = match Clips::find(app, visibility, row.evaluation).await {
+        Ok(clips) => clips,
+        Err(problem) if problem.kind().status().is_client_error() => return Ok(Vec::new()),
+        Err(problem) => return Err(problem),
+    };
+    let mut lines = clips.episodes().await?.episodes;
+    lines.retain(|line| !line.success && line.has_clips());
+    lines.sort_by_key(|line| Reverse(badness(line)));
+    let mut tasks = Vec::new();
+    let (mut worst, others): (Vec<EpisodeLine>, Vec<EpisodeLine>) =
+        lines.into_iter().partition(|line| {
+            let is_first = !tasks.contains(&line.task);
+            tasks.push(line.task);
+            is_first
+        });
+    worst.extend(others);
+    worst.truncate(MAX_FAILED);
+    let mut failed = Vec::new();
+    for line in worst {
+        let episode = clips.episode(line.task, line.episode).await?;
+        failed.push(FailedEpisode {
+            task: line.task,
+            episode: line.episode,
+            path: page_path(row.evaluation, line.task, line.episode),
+            violations: line.broken.len(),
+            end_reason: line.why,
+            still: Still::new(&episode.motion, None),
+        });
+    }
+    Ok(failed)
+}
+
+fn badness(line: &EpisodeLine) -> (usize, u32) {
+    (line.broken.len(), line.late)
+}

@@ -1,0 +1,153 @@
+//! A form that was submitted after the session had expired. What was typed is kept in the page on which the user signs in, and shown
+//! once more afterwards, to be sent. It is kept in the pages only, never on the server or in an address, and secrets are not kept.
+
+use crate::{
+    frame::{Frame, PageProblem, render},
+    page_auth::form_path,
+};
+use askama::Template;
+use axum::response::Response;
+use faceoff_service::app::App;
+
+/// A form with what was typed.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(super) struct KeptForm {
+    /// Path to which the form is sent.
+    pub(super) path: String,
+    pub(super) fields: Vec<KeptField>,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct KeptField {
+    pub(super) name: String,
+    pub(super) value: String,
+}
+
+/// Words in the names of fields that are not kept: secrets, and the confirmation of a decision, which has to be given in view of its
+/// effects.
+const NOT_KEPT: [&str; 6] = ["password", "secret", "token", "code", "old", "confirm"];
+
+/// Prefix of a kept field's name in the form of the sign-in page, whose own fields are thus distinct.
+const PREFIX: &str = "kept.";
+
+/// Name of the field with the path of the kept form.
+const PATH_FIELD: &str = "form";
+
+impl KeptField {
+    /// The name as a label.
+    pub(super) fn label(&self) -> String {
+        let words = self.name.replace('_', " ");
+        let mut letters = words.chars();
+        let first = letters.next().into_iter().flat_map(char::to_uppercase);
+        first.chain(letters).collect()
+    }
+
+    /// Is it a ticked checkbox?
+    pub(super) fn is_ticked(&self) -> bool {
+        self.value == "on"
+    }
+
+    /// Does it need more than one line?
+    pub(super) fn is_long(&self) -> bool {
+        self.value.chars().count() > 60 || self.value.contains('\n')
+    }
+}
+
+impl KeptForm {
+    /// The form that was sent to `path`; `None` if nothing was typed.
+    pub(super) fn new(path: &str, fields: Vec<(String, String)>) -> Option<Self> {
+        let is_kept = |name: &str| NOT_KEPT.iter().all(|word| !name.contains(word));
+        let fields: Vec<KeptField> = fields
+            .into_iter()
+            .filter(|(name, value)| is_kept(name) && !value.is_empty())
+            .map(|(name, value)| KeptField { name, value })
+            .collect();
+        (!fields.is_empty()).then(|| Self {
+            path: path.to_owned(),
+            fields,
+        })
+    }
+
+    /// The form among the fields of the sign-in page; `None` if it keeps none.
+    pub(super) fn among(fields: &[(String, String)]) -> Option<Self> {
+        let (_, path) = fields.iter().find(|(name, _)| name == PATH_FIELD)?;
+        let kept = fields.iter().filter_map(|(name, value)| {
+            let name = name.strip_prefix(PREFIX)?;
+            Some((name.to_owned(), value.clone()))
+        });
+        Self::new(form_path(path)?, kept.collect())
+    }
+
+    /// The fields that the sign-in page needs to keep the form.
+    pub(super) fn hidden_fields(&self) -> impl Iterator<Item = (String, &str)> {
+        let path = std::iter::once((PATH_FIELD.to_owned(), self.path.as_str()));
+        let fields = self.fields.iter();
+        path.chain(fields.map(|field| (format!("{PREFIX}{}", field.name), field.value.as_str())))
+    }
+}
+
+#[derive(Template)]
+#[template(path = "kept_form.html")]
+struct Page {
+    frame: Frame,
+    form: KeptForm,
+}
+
+/// The page from which a user who has signed in sends the form.
+pub(super) async fn page(app: &App, form: KeptForm) -> Result<Response, PageProblem> {
+    render(&Page {
+        frame: Frame::load(app, "").await?,
+        form,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pairs(fields: &[(&str, &str)]) -> Vec<(String, String)> {
+        let owned = |(name, value): &(&str, &str)| ((*name).to_owned(), (*value).to_owned());
+        fields.iter().map(owned).collect()
+    }
+
+    #[test]
+    fn secrets_and_confirmations_are_not_kept() {
+        let typed = [
+            ("text", "a <b>\r\nc"),
+            ("password", "x"),
+            ("new_password", "x"),
+            ("old", "x"),
+            ("api_token", "x"),
+            ("confirm", "Alpha"),
+            ("empty", ""),
+        ];
+        let form = KeptForm::new("/dashboard/questions", pairs(&typed)).unwrap();
+        let names: Vec<&str> = form.fields.iter().map(|field| &*field.name).collect();
+        assert_eq!(names, ["text"]);
+        assert_eq!(KeptForm::new("/dashboard", pairs(&typed[1..])), None);
+    }
+
+    #[test]
+    fn sign_in_page_gives_the_form_back() {
+        let typed = [
+            ("next", "mine"),
+            ("form", "A"),
+            ("opens_at", "2026-03-01T10:00"),
+        ];
+        let form = KeptForm::new("/organiser/stages", pairs(&typed)).unwrap();
+        let hidden = form.hidden_fields();
+        let hidden: Vec<_> = hidden
+            .map(|(name, value)| (name, value.to_owned()))
+            .collect();
+        assert_eq!(KeptForm::among(&hidden), Some(form));
+        for foreign in [
+            "https://evil.example/organiser",
+            "//evil.example",
+            "/sign-in",
+            "/account",
+        ] {
+            let hidden = pairs(&[("form", foreign), ("kept.text", "a")]);
+            assert_eq!(KeptForm::among(&hidden), None, "{foreign}");
+        }
+    }
+}
