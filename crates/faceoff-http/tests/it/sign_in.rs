@@ -242,7 +242,7 @@ async fn navigation_names_user_and_pending_decisions() {
     let question = site.get("/api/v1/questions", Some(ADMIN)).await.json(200);
     let answer = format!("/organiser/messages/{}", string(&question[0]["id"]));
     grace.submit(&answer, &[("text", "Soon.")]).await;
-    assert_eq!(badge(&mut grace).await, ["1 pending decisions"]);
+    assert_eq!(badge(&mut grace).await, ["1 pending decision"]);
     // The same board has different tags for different viewers, who thus never get each other's page.
     let tag = |answer: crate::site::Answer| answer.header("etag").to_owned();
     let tags = [
