@@ -63,9 +63,11 @@ struct OverallPage {
     front: Option<FrontPage>,
     /// For cards that show a link.
     description: String,
-    styles: [&'static str; 2],
+    style: &'static str,
     course: Option<TeamsChart>,
     downloads: Downloads,
+    /// BLAKE3 hash of the season's secret, from which all episodes are drawn.
+    commitment: String,
 }
 
 /// Addresses of the shown board, and of its history, in other formats.
@@ -151,9 +153,10 @@ pub(super) async fn overall(
     let page = OverallPage {
         description: description(&competition, front.as_ref()),
         front,
-        styles: [assets::EPISODES_STYLE.url(), assets::FRONT_STYLE.url()],
+        style: assets::FRONT_STYLE.url(),
         course: course.chart(&board),
         downloads: Downloads::new(&board, &query),
+        commitment: season.commitment,
         competition: competition.short_title.clone(),
         frame: Frame::for_app(&app, season.name, "/"),
         board_info: BoardInfo::load(&app, &board, &visibility, &address, season.paused).await?,
@@ -181,7 +184,8 @@ struct TaskPage {
     aim: String,
     /// Elements of an SVG drawing; empty without one.
     drawing: String,
-    styles: [&'static str; 2],
+    commitment: String,
+    style: &'static str,
     course: Option<TeamsChart>,
     downloads: Downloads,
     /// Profile, episodes and rules of all rows; `None` if rows differ.
@@ -228,9 +232,10 @@ pub(super) async fn by_task(
     let previous = timeline.previous_board.as_ref();
     let context = Context::new(&board, previous, &course, sort.is_by_rank());
     render_with_etag(&TaskPage {
-        styles: [assets::EPISODES_STYLE.url(), assets::FRONT_STYLE.url()],
+        style: assets::FRONT_STYLE.url(),
         course: course.chart(&board),
         downloads: Downloads::new(&board, &query),
+        commitment: season.commitment,
         drawing: info.drawing.clone(),
         frame: Frame::for_app(&app, season.name, path.clone()),
         board_info: BoardInfo::load(&app, &board, &visibility, &address, season.paused).await?,

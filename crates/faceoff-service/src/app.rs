@@ -6,6 +6,7 @@ use crate::{
     change_quota::ChangeQuota,
     config::HttpConfig,
     credential,
+    highlight::Highlight,
     network::Network,
     partial_uploads::PartialUploads,
     passwords::Passwords,
@@ -16,7 +17,6 @@ use crate::{
     shared_cache::SharedCache,
     summaries::Summaries,
     upload_slots::UploadSlots,
-    views::highlight::Highlight,
 };
 use axum::http::HeaderMap;
 use faceoff_api::views::champion_shares::ChampionSharesView;

@@ -19,6 +19,7 @@ pub mod download;
 pub mod episode_path;
 pub mod extract;
 pub mod free_space;
+pub mod highlight;
 pub mod link_key;
 pub mod network;
 mod partial_uploads;

@@ -47,7 +47,10 @@ async fn board_shows_tiers_rates_intervals_points_and_scores() {
     );
     let names: Vec<_> = BOARD_ORDER.iter().map(|(_, name)| *name).collect();
     assert_eq!(texts(&html, ".board th.team > a"), names);
-    assert_eq!(texts(&html, ".board td.rank"), ["1", "2", "3", "4", "5"]);
+    assert_eq!(
+        texts(&html, ".board td.rank"),
+        ["1=", "1=", "3=", "3=", "5"]
+    );
     for (tier, name) in BOARD_ORDER {
         let rows = texts(&html, &format!("tbody[data-tier={tier}] th.team > a"));
         assert!(
@@ -73,7 +76,7 @@ async fn board_shows_tiers_rates_intervals_points_and_scores() {
     let setting = "evaluation profile, 1000 episodes per task, rules airhockey-2023.3";
     assert!(caption.contains(setting), "{caption}");
     let commitment = site.store.season().await.unwrap().commitment;
-    let legend = texts(&html, ".legend").join(" ");
+    let legend = texts(&html, ".legend, .legend ~ .note").join(" ");
     for part in [commitment.as_str(), "Wilson", "0.4 × hit", "at most 0.5,"] {
         assert!(legend.contains(part), "{part:?} is not in the legend");
     }
@@ -278,7 +281,7 @@ async fn board_page_shows_next_steps_and_progress() {
         assert_eq!(rows, ["Alpha Running 0 of 12"], "{day}");
         let total = texts(&html, ".under-way .total-progress").join(" ");
         assert!(
-            total.starts_with("0 of 12 episodes; 0 of 1 evaluations done."),
+            total.starts_with("In progress: 0 of 1 evaluations done 0 of 12 episodes"),
             "{total}"
         );
         site.next_day();

@@ -40,8 +40,8 @@ async fn board_page_shows_changes_since_the_previous_day() {
         assert_eq!(
             ranks,
             [
-                "1▲ 1 up since 2026-03-01",
-                "2▼ 1 down since 2026-03-01",
+                "1=▲ 1 up since 2026-03-01",
+                "1=▼ 1 down since 2026-03-01",
                 "3new: not on the board of 2026-03-01",
             ],
             "{path}"

@@ -234,11 +234,11 @@ async fn statistically_tied_teams_share_a_rank_group() {
     assert!(page.contains(&format!("bootstrap with {resamples} resamples")));
     let hit_board = site.get("/tasks/hit", None).await.body;
     assert!(
-        hit_board.contains("statistically tied with Best"),
+        hit_board.contains("Statistically tied with Best"),
         "{hit_board}"
     );
     // Labels without information are left out: overall all teams differ, and only one tier depends on chance.
-    assert!(!page.contains("statistically tied with"), "{page}");
+    assert!(!page.contains("Statistically tied with"), "{page}");
     assert_eq!(page.matches("tier change</abbr>").count(), 1, "{page}");
     let evaluation = site.get(&format!("/evaluations/{best}"), None).await.body;
     assert!(

@@ -767,13 +767,12 @@ async fn day_has_one_primary_action() {
     };
     assert_eq!(primary().await, ["Start today’s evaluation"]);
     let pause = json!({ "reason": "a test" });
-    site.post("/api/v1/queue/pause", Some(ADMIN), &pause)
-        .await
-        .json(200);
+    let paused = site.post("/api/v1/queue/pause", Some(ADMIN), &pause).await;
+    assert_eq!(paused.status, 204);
     assert_eq!(primary().await, ["Resume the queue"]);
-    site.post("/api/v1/queue/resume", Some(ADMIN), &json!({}))
-        .await
-        .json(200);
+    let empty = json!({});
+    let resumed = site.post("/api/v1/queue/resume", Some(ADMIN), &empty).await;
+    assert_eq!(resumed.status, 204);
     site.start_day().await;
     assert!(primary().await.is_empty());
 }

@@ -111,10 +111,8 @@ async fn board_without_settings_shows_those_of_the_ruleset() {
     );
     assert_eq!(board.get("perturbations"), None);
     let page = site.get("/", None).await.body;
-    assert!(
-        page.contains("0.4 × hit + 0.4 × defend + 0.2 × prepare"),
-        "{page}"
-    );
+    assert_eq!(page.matches("40&nbsp;% of the score").count(), 2, "{page}");
+    assert_eq!(page.matches("20&nbsp;% of the score").count(), 1, "{page}");
     assert!(!page.contains("own perturbation magnitudes"), "{page}");
 }
 

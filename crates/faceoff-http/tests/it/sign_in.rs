@@ -206,7 +206,7 @@ async fn navigation_names_user_and_pending_decisions() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let role = json!({ "role": "member", "team": team.id, "note": "Ada" });
-    let mut ada = Browser::join(&site, "Ada <b>", role).await;
+    let mut ada = Browser::join(&site, "Ada O'Neil", role).await;
     let role = json!({ "role": "organiser", "note": "Grace" });
     let mut grace = Browser::join(&site, "Grace", role).await;
     let mut visitor = Browser::new(&site);
@@ -217,7 +217,7 @@ async fn navigation_names_user_and_pending_decisions() {
         assert_eq!(texts(&page, entries).last().unwrap(), "Account", "{path}");
         let page = Html::parse_document(&ada.open(path).await.body);
         let own = texts(&page, entries);
-        assert_eq!(own[own.len() - 2..], ["Dashboard", "Ada <b>"], "{path}");
+        assert_eq!(own[own.len() - 2..], ["Dashboard", "Ada O'Neil"], "{path}");
         assert!(links(&page, "header nav a").contains(&"/dashboard".to_owned()));
         let page = Html::parse_document(&grace.open(path).await.body);
         let own = texts(&page, entries);

@@ -503,7 +503,7 @@ async fn dashboard_shows_rank_tasks_and_next_cutoff() {
         ("Beta", result([0.5, 0.25, 0.0], 10.0)),
     ])
     .await;
-    let teams = site.get("/api/v1/teams", None).await.json(200);
+    let teams = site.get("/api/v1/teams", Some(ADMIN)).await.json(200);
     let beta = teams.as_array().unwrap().iter();
     let beta = beta.clone().find(|team| team["name"] == "Beta").unwrap();
     let role = json!({ "role": "member", "team": beta["id"], "note": "Ben" });

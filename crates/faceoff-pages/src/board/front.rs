@@ -1,7 +1,7 @@
 //! The front page, above the board: what the competition is, who leads, when the next evaluation is, and how to take part.
 
 use super::rows::{Group, OverallRow};
-use crate::{figures::in_words, frame::PageProblem, highlight::HighlightLoop};
+use crate::{assets, figures::in_words, frame::PageProblem, highlight::HighlightLoop};
 use faceoff_api::views::board::BoardView;
 use faceoff_service::{
     app::App,
@@ -18,6 +18,8 @@ pub(super) struct FrontPage {
     pub(super) take_part: &'static str,
     pub(super) news: Option<News>,
     pub(super) highlight: Option<HighlightLoop>,
+    /// The style sheet of the highlight.
+    pub(super) style: &'static str,
     /// The day of the newest results.
     pub(super) day: Option<Date>,
     pub(super) tasks: Vec<TaskCard>,
@@ -80,6 +82,7 @@ impl FrontPage {
             highlight: highlight
                 .as_ref()
                 .and_then(|found| HighlightLoop::new(found, competition)),
+            style: assets::EPISODES_STYLE.url(),
             day,
             tasks: task_cards(competition, board),
         })

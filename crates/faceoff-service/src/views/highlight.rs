@@ -3,26 +3,17 @@
 use crate::{
     app::AppState,
     boxed,
+    highlight::Highlight,
     problem::{Problem, ProblemKind},
     views::{clips::Clips, visibility::Visibility},
 };
 use faceoff_api::views::board::BoardRow;
 use faceoff_replay::{Clip, ClipKey, EpisodeLine, Pack, ReplayError};
-use faceoff_types::{Competition, EvaluationId, Task};
+use faceoff_types::{Competition, EvaluationId};
 use std::{cmp::Reverse, sync::Arc};
 
 /// Teams whose episodes are looked at, from the first of the board on.
 const MAX_TEAMS: usize = 3;
-
-/// An episode that ended in success, with its motion.
-#[derive(Debug)]
-pub struct Highlight {
-    pub task: Task,
-    pub episode: u32,
-    /// Control steps of the episode.
-    pub steps: u32,
-    pub motion: Clip,
-}
 
 /// A highlight with its team.
 #[derive(Debug)]

@@ -280,7 +280,7 @@ async fn hidden_results_are_on_no_page_until_requested() {
 
     let html = open_without_results(&cup.site, &game).await.html(200);
     let with_result = format!("{game}?show=result");
-    assert!(links(&html, "#result ~ p a").contains(&with_result));
+    assert!(links(&html, ".lead p a").contains(&with_result));
     let body = open_without_results(&cup.site, &with_result).await.body;
     assert!(body.contains("7913"), "{body}");
 }
