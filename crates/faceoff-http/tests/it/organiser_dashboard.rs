@@ -760,6 +760,8 @@ async fn announcement_sent_twice_is_published_once() {
 #[tokio::test]
 async fn day_has_one_primary_action() {
     let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    site.valid_submission(&team, "agent").await;
     let mut grace = grace(&site).await;
     let mut primary = async || {
         let html = dashboard_page(&grace.open("/organiser/day").await, 200);
