@@ -109,6 +109,7 @@ fn dashboards_follow_accessibility_rules() {
         &format!("/dashboard/submissions/{submission}"),
         "/dashboard/questions",
         "/dashboard/access",
+        "/dashboard/settings",
         "/account",
     ] {
         all_faults.extend(check_page(&member, &server, &axe_script, path));

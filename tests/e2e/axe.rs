@@ -20,14 +20,12 @@ const LIST_WIDE_ELEMENTS: &str = "[...document.querySelectorAll('body *')]
     .map(element => element.outerHTML.slice(0, 120)).slice(-3)";
 
 /// The viewports (sizes of the browser window) and colour schemes in which pages are checked.
-const VIEWS: [View; 4] = [
-    View::DESKTOP,
-    View::PHONE.dark(),
-    View {
-        width: 400,
-        ..View::PHONE
-    },
-    View::PROJECTOR,
+const VIEWS: [View; 3] = [View::DESKTOP, View::PHONE.dark(), View::PROJECTOR];
+
+/// Widths of windows in which no page is wider than its window: phones, tablets and laptops, and widths beside those at which the
+/// layout changes.
+const WIDTHS: [u32; 13] = [
+    320, 360, 390, 430, 480, 600, 735, 768, 868, 897, 1024, 1200, 1440,
 ];
 
 /// The source of axe-core.
@@ -60,6 +58,16 @@ pub fn faults(page: &Page, axe_script: &str, path: &str) -> Vec<String> {
                 .iter()
                 .map(|violation| format!("{path} {}: {violation}", view.width));
             faults.extend(violations);
+        }
+    }
+    for width in WIDTHS {
+        page.set_view(View {
+            width,
+            ..View::DESKTOP
+        });
+        if page.overflow() != 0 {
+            let elements = page.evaluate(LIST_WIDE_ELEMENTS);
+            faults.push(format!("{path} is wider than {width} pixels: {elements}"));
         }
     }
     faults.extend(page.console_errors());

@@ -1,6 +1,6 @@
 //! The last result of a team: its rank, a bar for each task, and the worst failed episodes.
 
-use crate::{figures::Rate, replay::page_path, replay_section::Still};
+use crate::{episode_text::plain_end, figures::Rate, replay::page_path, replay_section::Still};
 use faceoff_api::{requests::BoardQuery, views::board::BoardRow};
 use faceoff_replay::EpisodeLine;
 use faceoff_service::{
@@ -101,7 +101,7 @@ async fn worst_failed(
             episode: line.episode,
             path: page_path(row.evaluation, line.task, line.episode),
             violations: line.broken.len(),
-            end_reason: line.why,
+            end_reason: plain_end(&line, &episode.motion.header.contacts),
             still: Still::new(&episode.motion, None),
         });
     }

@@ -38,8 +38,8 @@ export class Orbit implements CameraPosition {
   /** Arms on the table. */
   private arms = 1;
   private field: Field = { tanX: 0.4, tanY: 0.25 };
-  /** Is the shape of the picture known? */
-  private isFramed = false;
+  /** Is the camera where a link has put it? */
+  private isOfLink = false;
 
   /** `prefersReducedMotion`: the camera jumps. */
   constructor(
@@ -60,16 +60,17 @@ export class Orbit implements CameraPosition {
   /** Moves the camera to a position of a link. */
   restore(position: CameraPosition): void {
     this.camera = null;
+    this.isOfLink = true;
     this.animateTo(this.turned(position, 0, 0, 1));
   }
 
   /** Fits the picture to another shape or number of arms, at once. */
   frame(field: Field, arms: number): void {
-    // What was turned and zoomed by hand keeps its share of the picture when its shape changes.
-    const isReshaped = this.isFramed && arms === this.arms;
+    // What was turned and zoomed by hand keeps its share of the picture when its shape changes. A position of a link holds as it is,
+    // since the picture gets its shape after the link was read.
+    const isReshaped = !this.isOfLink && arms === this.arms;
     const before = cameraPosition("corner", this.arms, this.field).distance;
     const factor = isReshaped ? cameraPosition("corner", arms, field).distance / before : 1;
-    this.isFramed = true;
     this.field = field;
     this.arms = arms;
     this.animationStart = null;
@@ -106,7 +107,7 @@ export class Orbit implements CameraPosition {
   pinch(dx: number, dy: number, angle: number, factor: number, height: number): void {
     const metresPerPixel = (2 * this.distance * this.field.tanY) / height;
     const position = this.turned(this, angle, 0, 1 / factor);
-    if (this.camera !== "follow") this.camera = null;
+    this.leavePreset();
     const { right, back } = cameraAxes(this.azimuth, 0);
     // Seen flatly, a pixel covers more of the table, up to three times.
     const away = dy / Math.max(Math.sin(this.elevation), 1 / 3);
@@ -158,6 +159,7 @@ export class Orbit implements CameraPosition {
 
   /** Turning and zooming by hand leave the presets, but the camera that follows keeps following. */
   private leavePreset(): void {
+    this.isOfLink = false;
     if (this.camera !== "follow") this.camera = null;
   }
 

@@ -1,0 +1,72 @@
+//! The front page in a real browser: what a visitor who has never heard of the competition sees, and what moves.
+
+use crate::replay::{PREFERS_REDUCED_MOTION, released_evaluation};
+use faceoff_tests::browser::{Browser, Page};
+
+/// JavaScript: does the drawing move, and where is its last body?
+const IS_MOVING: &str = "!document.querySelector('[data-highlight] svg').animationsPaused()";
+
+fn click(page: &Page, selector: &str) {
+    let _ = page.evaluate(&format!("document.querySelector({selector:?}).click()"));
+}
+
+#[test]
+fn front_page_says_what_it_is_and_who_leads() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let (server, evaluation) = released_evaluation(scratch.path());
+    let browser = Browser::start(scratch.path());
+    let page = browser.open(&format!("{}/", server.url));
+    assert!(page.text(".summary").contains("play air hockey"));
+    assert!(page.text(".leader").starts_with("Alpha leads with "));
+    assert_eq!(page.text(".actions a:last-child"), "Rules");
+    let tasks = page.text(".task-cards");
+    assert!(
+        tasks.contains("goalkeeper") && tasks.contains("% of the score"),
+        "{tasks}"
+    );
+    // The picture leads to the replay of a success of the leader.
+    let replay = page.evaluate("document.querySelector('[data-highlight] a').getAttribute('href')");
+    let replay = replay.as_str().expect("the picture is a link");
+    assert!(replay.starts_with(&evaluation), "{replay}");
+    page.wait_until(IS_MOVING);
+    let x = "document.querySelector('[data-highlight] .puck').cx.animVal.value";
+    let start = page.evaluate(x);
+    page.wait_until(&format!("{x} != {start}"));
+    click(&page, "[data-highlight-pause]");
+    assert_eq!(page.evaluate(IS_MOVING), false);
+    assert_eq!(page.text("[data-highlight-pause]"), "Play");
+    page.go_to(&format!("{}{replay}", server.url));
+    assert_eq!(page.text(".verdict strong").chars().next(), Some('✓'));
+}
+
+#[test]
+fn front_page_stays_still_for_reduced_motion() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let (server, _) = released_evaluation(scratch.path());
+    let browser = Browser::start(scratch.path());
+    let page = browser.open("about:blank");
+    page.before_scripts(PREFERS_REDUCED_MOTION);
+    page.go_to(&format!("{}/", server.url));
+    page.wait_for("[data-highlight-pause]:not([hidden])");
+    assert_eq!(page.evaluate(IS_MOVING), false);
+    click(&page, "[data-highlight-pause]");
+    page.wait_until(IS_MOVING);
+}
+
+#[test]
+fn heads_of_the_board_explain_themselves() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let (server, _) = released_evaluation(scratch.path());
+    let browser = Browser::start(scratch.path());
+    let page = browser.open(&format!("{}/", server.url));
+    let is_shown = "document.querySelector('#about-points').checkVisibility()";
+    assert_eq!(page.evaluate(is_shown), false);
+    click(&page, "[popovertarget=about-points]");
+    assert_eq!(page.evaluate(is_shown), true);
+    assert!(
+        page.text("#about-points")
+            .contains("endanger the real robot")
+    );
+    page.press("Escape");
+    page.wait_until(&format!("!{is_shown}"));
+}
