@@ -158,7 +158,10 @@ pub(super) async fn overall(
         downloads: Downloads::new(&board, &query),
         commitment: season.commitment,
         competition: competition.short_title.clone(),
-        frame: Frame::for_app(&app, season.name, "/"),
+        frame: match query == BoardPageQuery::default() {
+            true => Frame::for_app(&app, season.name, "/").located(&app, "/"),
+            false => Frame::for_app(&app, season.name, "/"),
+        },
         board_info: BoardInfo::load(&app, &board, &visibility, &address, season.paused).await?,
         days,
         conditions: common_conditions(&board.rows),

@@ -289,7 +289,9 @@ pub(super) async fn page(
     };
     render(&Page {
         violation_headers: figures::violation_headers(app.config.competition()),
-        frame: Frame::load(&app, "").await?,
+        frame: Frame::load(&app, "")
+            .await?
+            .located(&app, &format!("/evaluations/{id}")),
         id,
         team: view.team_name.to_string(),
         agent: submission.agent_name,

@@ -35,6 +35,8 @@ pub(super) struct Frame {
     pub(super) subject: Option<String>,
     /// Address of the picture on cards that show a link; `None` if the public address of the server is not configured.
     pub(super) card_image: Option<String>,
+    /// The page's own address, for cards and search engines; `None` without a public address, and on pages that have several.
+    pub(super) address: Option<String>,
 }
 
 impl Frame {
@@ -70,6 +72,15 @@ impl Frame {
         }
     }
 
+    /// Sets the page's own address.
+    pub(super) fn located(self, app: &AppState, path: &str) -> Self {
+        let base = app.config.public_url.as_deref();
+        Self {
+            address: base.map(|base| format!("{base}{path}")),
+            ..self
+        }
+    }
+
     /// The frame of a page without content from the store.
     pub(super) fn new(season: String, current: impl Into<String>) -> Self {
         Self {
@@ -85,6 +96,7 @@ impl Frame {
             signed_in: SignedIn::current(),
             subject: None,
             card_image: None,
+            address: None,
         }
     }
 

@@ -144,7 +144,9 @@ pub(super) async fn page(
         _ => {}
     }
     render(&Page {
-        frame: Frame::load(&app, format!("/tournaments/{}", view.tournament)).await?,
+        frame: Frame::load(&app, format!("/tournaments/{}", view.tournament))
+            .await?
+            .located(&app, &format!("/games/{id}")),
         id,
         tournament: view.tournament,
         tournament_name: view.tournament_name.to_string(),

@@ -71,8 +71,9 @@ pub(super) async fn page(
     path: Result<EpisodePath, Problem>,
 ) -> Result<Response, PageProblem> {
     let view = EpisodeReplay::load(&app, viewer?, path?).await?;
+    let own_path = page_path(view.id, view.task, view.episode);
     render(&Page {
-        frame: Frame::load(&app, "").await?,
+        frame: Frame::load(&app, "").await?.located(&app, &own_path),
         view,
     })
 }

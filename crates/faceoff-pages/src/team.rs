@@ -98,7 +98,9 @@ pub(super) async fn page(
         .filter(|other| other.id != stage.id);
     render(&Page {
         tournaments: entered_tournaments(&app, id).await?,
-        frame: Frame::load(&app, "").await?,
+        frame: Frame::load(&app, "")
+            .await?
+            .located(&app, &format!("/teams/{id}")),
         stage: stage.name.to_string(),
         other_stages: other_stages
             .map(|other| (other.name.to_string(), format!("?stage={}", other.id)))

@@ -135,7 +135,9 @@ pub(super) async fn page(
         !is_hidden && entrant.departure.is_none() && !standings.iter().any(is_listed)
     });
     let page = Page {
-        frame: Frame::load(&app, format!("/tournaments/{id}")).await?,
+        frame: Frame::load(&app, format!("/tournaments/{id}"))
+            .await?
+            .located(&app, &format!("/tournaments/{id}")),
         id,
         phase: tournament_text::phase_label(&view.head),
         format: tournament_text::describe_format(&view.rules),

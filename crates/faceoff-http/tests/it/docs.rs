@@ -437,6 +437,18 @@ async fn pages_have_metadata_for_link_previews() {
         assert_eq!(answer.status, 200);
         assert_eq!(answer.header("content-type"), "image/png");
     }
+    let team = site.team("Alpha").await;
+    for path in ["/".to_owned(), format!("/teams/{}", team.id)] {
+        let page = fetch_page(&site, &path).await;
+        let address = format!("https://faceoff.example.org{path}");
+        assert_eq!(metadata(&page, "og:url"), [&*address]);
+        assert_eq!(attributes(&page, "link[rel=canonical]", "href"), [address]);
+    }
+    let team_page = fetch_page(&site, &format!("/teams/{}", team.id)).await;
+    assert!(metadata(&team_page, "og:description")[0].contains("Alpha"));
+    // A board of another day or order has several addresses.
+    let sorted = fetch_page(&site, "/?sort=team").await;
+    assert_eq!(metadata(&sorted, "og:url"), [""; 0]);
 }
 
 #[tokio::test]

@@ -1,7 +1,6 @@
 //! News feed of the season: announcements, openings and closings of stages and tournaments, and releases of evaluation days.
 
 use crate::{app::AppState, boxed, problem::Problem};
-use faceoff_api::paths;
 use faceoff_store::Stage;
 use jiff::Timestamp;
 use uuid::Uuid;
@@ -101,7 +100,7 @@ async fn announcements(app: &AppState) -> Result<Vec<NewsItem>, Problem> {
         occurred_at: announcement.at,
         title: xml_safe(&announcement.title),
         text: Some(xml_safe(&announcement.text)),
-        path: "/announcements".to_owned(),
+        path: format!("/announcements#a{}", announcement.id),
     });
     Ok(items.collect())
 }
@@ -134,7 +133,7 @@ async fn tournament_items(app: &AppState) -> Result<Vec<NewsItem>, Problem> {
     let tournaments = app.store.tournaments().await?;
     for tournament in tournaments.into_iter().rev().take(MAX_TOURNAMENTS) {
         let (id, name) = (tournament.id, &tournament.name);
-        let path = paths::tournament(id);
+        let path = format!("/tournaments/{id}");
         let mut add = |event: &str, occurred_at: Timestamp, title: String| {
             items.push(item(
                 &format!("tournament {id} {event}"),
