@@ -5,6 +5,7 @@ mod address;
 mod course;
 mod day_progress;
 mod days;
+pub(super) mod embedded;
 mod front;
 mod info;
 mod rows;

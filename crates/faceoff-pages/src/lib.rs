@@ -76,6 +76,7 @@ use std::{sync::Arc, time::Duration};
 pub fn router(app: &App, time_limit: Duration, api: Arc<Value>) -> Router<App> {
     Router::new()
         .route("/", get(board::overall))
+        .route("/embed", get(board::embedded::page))
         .route("/tasks/{task}", get(board::by_task))
         .route("/teams/{id}", get(team::page))
         .route("/evaluations/{id}", get(evaluation::page))

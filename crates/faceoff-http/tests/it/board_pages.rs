@@ -228,3 +228,19 @@ async fn full_board_page_loads_less_than_100_kilobytes() {
         assert!(bytes < 100_000, "{path} loads {bytes} bytes");
     }
 }
+
+#[tokio::test]
+async fn embedded_board_shows_first_teams_to_other_sites() {
+    let site = Site::start().await;
+    two_days(&site).await;
+    let answer = site.get("/embed", None).await;
+    let policy = answer.header("content-security-policy");
+    assert!(policy.contains("frame-ancestors *"), "{policy}");
+    let html = answer.html(200);
+    assert_eq!(texts(&html, "tbody td:first-child"), ["1=", "1=", "3"]);
+    let scores = texts(&html, "tbody td.number");
+    assert!(scores[0].starts_with("70.0"), "{scores:?}");
+    assert!(attributes(&html, "tbody a", "href")[0].starts_with("/teams/"));
+    // Framing the board itself is not allowed.
+    assert_eq!(site.get("/", None).await.header("x-frame-options"), "DENY");
+}
