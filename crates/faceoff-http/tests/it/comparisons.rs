@@ -239,7 +239,7 @@ async fn statistically_tied_teams_share_a_rank_group() {
     );
     // Labels without information are left out: overall all teams differ, and only one tier depends on chance.
     assert!(!page.contains("Statistically tied with"), "{page}");
-    assert_eq!(page.matches("tier change</abbr>").count(), 1, "{page}");
+    assert_eq!(page.matches("other tier by chance:").count(), 1, "{page}");
     let evaluation = site.get(&format!("/evaluations/{best}"), None).await.body;
     assert!(
         evaluation.contains("another tier on other episodes: under 0.05 %"),

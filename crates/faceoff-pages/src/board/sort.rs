@@ -51,7 +51,11 @@ fn columns(
         let column = BoardColumn::Task(info.task);
         (column, info.title.as_str(), "success", "number")
     }));
-    columns.push((BoardColumn::Points, "Penalty", "points", "number"));
+    let unit = match task {
+        Some(_) => "points",
+        None => "points, worst task",
+    };
+    columns.push((BoardColumn::Points, "Penalty", unit, "number"));
     columns
 }
 
