@@ -3,7 +3,7 @@
 import { describe, expect, it } from "vitest";
 import { CAMERAS } from "../src/replay/fragment";
 import type { CameraPosition } from "../src/replay/fragment";
-import { cameraAxes, dot, fieldOf, fit, type Point3 } from "../src/view3d/framing";
+import { cameraAxes, dot, fieldOf, fit, visibleShare, type Point3 } from "../src/view3d/framing";
 import { Orbit } from "../src/view3d/orbit";
 import { pinchOf } from "../src/view3d/pointer";
 import { cameraPosition, followedPoint, pointsOf } from "../src/view3d/scenes";
@@ -93,6 +93,42 @@ describe("the camera", () => {
     expect(orbit.distance).toBeGreaterThan(near);
     orbit.frame(fieldOf(VERTICAL_RAD, 1.6), 2);
     expect(orbit.distance).toBeCloseTo(near, 9);
+  });
+
+  it("follows as turned by hand when the picture changes", () => {
+    const orbit = new Orbit(true, () => undefined);
+    orbit.frame(fieldOf(VERTICAL_RAD, 1.6), 2);
+    orbit.preset("follow");
+    orbit.tick(1000, { x: 0.7, y: -0.3 });
+    const selected = { azimuth: orbit.azimuth, elevation: orbit.elevation, distance: orbit.distance };
+    orbit.turn(2, 1);
+    orbit.zoom(2);
+    const { x, y, azimuth, elevation, distance } = orbit;
+    expect(azimuth).not.toBeCloseTo(selected.azimuth, 2);
+    orbit.frame(fieldOf(VERTICAL_RAD, 0.8), 2);
+    expect(orbit.camera).toBe("follow");
+    expect([orbit.x, orbit.y, orbit.azimuth, orbit.elevation]).toEqual([x, y, azimuth, elevation]);
+    expect(orbit.distance).toBeGreaterThan(distance);
+    orbit.frame(fieldOf(VERTICAL_RAD, 1.6), 2);
+    expect(orbit.distance).toBeCloseTo(distance, 9);
+    // Selected again, it is as it was.
+    orbit.preset("follow");
+    expect(orbit.distance).toBeCloseTo(selected.distance, 9);
+    const tall = fieldOf(VERTICAL_RAD, 0.8);
+    orbit.frame(tall, 2);
+    expect(orbit.elevation).toBeCloseTo(selected.elevation, 9);
+    expect(orbit.distance).toBeCloseTo(cameraPosition("follow", 2, tall).distance, 9);
+  });
+
+  it("has a place also if controls cover the picture", () => {
+    expect(visibleShare(400, 100)).toBe(0.75);
+    for (const covered of [100, 120]) {
+      const { tanX, tanY } = fieldOf(VERTICAL_RAD, 5);
+      const field = { tanX, tanY: tanY * visibleShare(100, covered) };
+      const { distance } = cameraPosition("corner", 2, field);
+      expect(distance).toBeGreaterThan(0);
+      expect(distance).toBeLessThan(Infinity);
+    }
   });
 });
 

@@ -7,7 +7,7 @@ import { fixed, stepText, timeText } from "../src/controls/format";
 import { actionFor, type KeyActions } from "../src/controls/keys";
 import { Clock } from "../src/replay/clock";
 import { columnName, csvOf } from "../src/replay/csv";
-import { courseEvents, courseScore, parseCourse } from "../src/replay/course";
+import { courseEvents, courseHas, courseScore, parseCourse } from "../src/replay/course";
 import { endText, eventsOf, scoreText } from "../src/replay/events";
 import { parseFragment, writeFragment, type LinkTarget } from "../src/replay/fragment";
 import { Score } from "../src/replay/score";
@@ -206,6 +206,14 @@ describe("the course of a game", () => {
     expect([100, 101, 1200, 1201].map((position) => scoreText(courseScore(course, position), names))).toEqual(
       ["striker 0 : 0 keeper", "striker 1 : 0 keeper", "striker 1 : 0 keeper", "striker 1 : 1 keeper"],
     );
+  });
+
+  it("has no contacts, lost pucks and late answers", () => {
+    const hidden = (...kinds: string[]) => courseHas(({ kind }) => !kinds.includes(kind));
+    expect(hidden("contact", "lost", "late")).toBe(true);
+    expect(hidden("contact", "lost", "late", "goal")).toBe(true);
+    expect(hidden("contact", "lost")).toBe(false);
+    expect(hidden("goal", "foul", "rally", "violation")).toBe(false);
   });
 
   it("is unknown if the page does not have it as expected", () => {

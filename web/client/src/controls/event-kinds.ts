@@ -1,7 +1,8 @@
 // Switches for the kinds of events on the time line and in the list.
 
 import { EVENT_KINDS, type SwitchedKind } from "../replay/fragment";
-import type { ReplayEvent } from "../replay/events";
+import { KINDS_OF_PARTS } from "../replay/course";
+import type { EventFilter, ReplayEvent } from "../replay/events";
 import { h } from "./dom";
 
 const NAMES: Record<SwitchedKind, string> = {
@@ -13,9 +14,6 @@ const NAMES: Record<SwitchedKind, string> = {
   lost: "Puck not seen",
   late: "Late answers",
 };
-
-/** Kinds that are off in a game until the visitor switches them on: they are known only of the parts that are loaded. */
-const OFF_IN_GAMES: readonly SwitchedKind[] = ["contact", "lost", "late"];
 
 /** A check box per kind of event. */
 export class EventKinds {
@@ -31,7 +29,8 @@ export class EventKinds {
     isGame: boolean,
     private readonly changed: () => void,
   ) {
-    this.initial = isGame ? OFF_IN_GAMES : [];
+    // In a game they are off until the visitor switches them on.
+    this.initial = isGame ? KINDS_OF_PARTS : [];
     this.hidden = new Set(this.initial);
     for (const kind of EVENT_KINDS) {
       const box = h("input", { attributes: { type: "checkbox" } });
@@ -48,7 +47,7 @@ export class EventKinds {
   }
 
   /** Is this event shown? How the replay ended always is. */
-  shows = (event: ReplayEvent): boolean => event.kind === "end" || !this.hidden.has(event.kind);
+  shows: EventFilter = (event) => event.kind === "end" || !this.hidden.has(event.kind);
 
   /** The kinds that are off, if the visitor changed them. */
   get changedKinds(): readonly SwitchedKind[] | undefined {

@@ -1,7 +1,8 @@
 // The course of a whole game: its rally ends and violations, which the page knows before any part of the recording is loaded.
 
 import type { ConstraintGroup, RallyEnd } from "../clip/motion";
-import { CONSTRAINT_NAMES, rallyEvent, type ReplayEvent, type SideNames } from "./events";
+import { CONSTRAINT_NAMES, rallyEvent, type EventFilter, type ReplayEvent, type SideNames } from "./events";
+import type { SwitchedKind } from "./fragment";
 
 /** Some violations of a side in a range of steps, inclusive. */
 interface ViolationRange {
@@ -17,6 +18,9 @@ export interface Course {
   readonly ends: readonly RallyEnd[];
   readonly violations: readonly ViolationRange[];
 }
+
+/** Kinds of events that a course does not have: they are known only of the parts that are loaded. */
+export const KINDS_OF_PARTS: readonly SwitchedKind[] = ["contact", "lost", "late"];
 
 const GROUPS = Object.keys(CONSTRAINT_NAMES) as ConstraintGroup[];
 
@@ -62,6 +66,11 @@ export function courseEvents(course: Course, names: SideNames): ReplayEvent[] {
   return [...course.ends.map((end) => rallyEvent(end, names)), ...violations].sort(
     (a, b) => a.position - b.position,
   );
+}
+
+/** Does a course have all kinds of events that are shown? */
+export function courseHas(shows: EventFilter): boolean {
+  return !KINDS_OF_PARTS.some((kind) => shows({ kind }));
 }
 
 /** The score at a position. The sample of a rally's end still belongs to the rally. */

@@ -23,6 +23,9 @@ export interface ReplayEvent {
   readonly side: 0 | 1 | null;
 }
 
+/** Which kinds of events are shown? */
+export type EventFilter = (event: Pick<ReplayEvent, "kind">) => boolean;
+
 const SYMBOLS: Record<EventKind, string> = {
   contact: "•",
   violation: "▲",

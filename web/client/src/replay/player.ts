@@ -14,7 +14,7 @@ import { Transport } from "../controls/transport";
 import { captionedSize, drawCaptioned } from "./caption";
 import type { Clock } from "./clock";
 import { parseCourse } from "./course";
-import type { ReplayEvent, SideNames } from "./events";
+import type { EventFilter, ReplayEvent, SideNames } from "./events";
 import { parseFragment, writeFragment, type Camera, type LinkTarget } from "./fragment";
 import type { Layers } from "./frame-state";
 import type { FrameLoop } from "./loop";
@@ -62,6 +62,7 @@ export class Player {
   private wasPlaying = false;
   private shownEvents: readonly ReplayEvent[] | null = null;
   private recording: RunningRecording | null = null;
+  private isLinkFollowed = false;
 
   constructor(private readonly options: PlayerOptions) {
     const { clock, sections } = options;
@@ -119,11 +120,14 @@ export class Player {
   }
 
   /** Loads the replays, and goes to the moment of the page's address. */
-  async open(): Promise<void> {
+  async open(viewers = this.viewers): Promise<void> {
     const target = parseFragment(location.hash);
-    const opened = await Promise.all(this.viewers.map((viewer) => viewer.open(target.step ?? 0)));
+    const opened = await Promise.all(viewers.map((viewer) => viewer.open(target.step ?? 0)));
     if (!opened.some(Boolean)) return;
     this.invalidate();
+    // The others may have been moved since then when one of several replays is opened again.
+    if (this.isLinkFollowed) return;
+    this.isLinkFollowed = true;
     this.follow(target);
   }
 
@@ -165,6 +169,7 @@ export class Player {
       eventsChanged: () => { this.showEvents(); },
       partShown: (part) => { this.offerLayers(part); },
       drawn: () => { this.drawn(viewer); },
+      openAgain: () => { void this.open([viewer]); },
     }); // prettier-ignore
     return viewer;
   }
@@ -285,7 +290,7 @@ export class Player {
     this.toNearest(direction, this.kinds.shows, "event");
   };
 
-  private toNearest(direction: 1 | -1, shows: (event: ReplayEvent) => boolean, name: string): void {
+  private toNearest(direction: 1 | -1, shows: EventFilter, name: string): void {
     const { clock } = this.options;
     clock.pause();
     const from = clock.position;
@@ -406,21 +411,40 @@ export class Player {
     const { clock } = this.options;
     if (this.recording !== null) {
       const { video } = this.recording;
-      this.recording = null;
+      this.showNoRecording();
       clock.pause();
-      this.share.showRecording(false);
-      void video.stop().then((file) => {
-        saveFile(file, this.fileName(this.viewers[0], "webm"));
-        this.announce("Video saved");
-      });
+      video.stop();
       return;
     }
     const { canvas } = this.viewers[0].picture;
     const width = Math.min(canvas.width, MAX_VIDEO_WIDTH);
     const size = captionedSize(width, (canvas.height / canvas.width) * width);
-    this.recording = { video: new VideoRecording(size), palette: this.viewers[0].palette };
+    const failed = (): void => { this.announce("The video could not be recorded."); }; // prettier-ignore
+    let video: VideoRecording;
+    try {
+      video = new VideoRecording(size);
+    } catch {
+      failed();
+      return;
+    }
+    this.recording = { video, palette: this.viewers[0].palette };
     this.share.showRecording(true);
+    video.file
+      .finally(() => {
+        // The browser has ended it, not the visitor.
+        if (this.recording?.video === video) this.showNoRecording();
+      })
+      .then((file) => {
+        saveFile(file, this.fileName(this.viewers[0], "webm"));
+        this.announce("Video saved");
+      })
+      .catch(failed);
     this.announce("Recording");
     clock.play();
+  }
+
+  private showNoRecording(): void {
+    this.recording = null;
+    this.share.showRecording(false);
   }
 }

@@ -19,9 +19,11 @@ export function canRecord(): boolean {
   );
 }
 
-/** A running recording of a canvas. */
+/** A running recording of a canvas. The constructor throws if the browser cannot start it. */
 export class VideoRecording {
   readonly context: CanvasRenderingContext2D;
+  /** The video, when the recording has ended; the browser may end it, too. Rejected if it could not be recorded. */
+  readonly file: Promise<Blob>;
   private readonly recorder: MediaRecorder;
   private readonly parts: Blob[] = [];
 
@@ -37,17 +39,16 @@ export class VideoRecording {
       videoBitsPerSecond: BITS_PER_S,
     });
     this.recorder.addEventListener("dataavailable", (event) => this.parts.push(event.data));
+    this.file = new Promise((resolve, reject) => {
+      this.recorder.addEventListener("stop", () => { resolve(new Blob(this.parts, { type: TYPE })); });
+      this.recorder.addEventListener("error", () => { reject(new Error("the browser ended the recording")); });
+    }); // prettier-ignore
     this.recorder.start();
   }
 
-  /** Ends the recording and returns the video. */
-  stop(): Promise<Blob> {
-    return new Promise((resolve) => {
-      this.recorder.addEventListener("stop", () => {
-        resolve(new Blob(this.parts, { type: TYPE }));
-      });
-      this.recorder.stop();
-      for (const track of this.recorder.stream.getTracks()) track.stop();
-    });
+  /** Ends the recording. */
+  stop(): void {
+    if (this.recorder.state !== "inactive") this.recorder.stop();
+    for (const track of this.recorder.stream.getTracks()) track.stop();
   }
 }

@@ -9,13 +9,14 @@ import { newPose } from "../motion/pose";
 import { StripCharts } from "../strips/strips";
 import type { Caption } from "./caption";
 import type { Clock } from "./clock";
-import { courseEvents, courseScore, type Course } from "./course";
-import { endText, eventsOf, scoreText, type ReplayEvent, type SideNames } from "./events";
+import { courseEvents, courseHas, courseScore, type Course } from "./course";
+import { endText, eventsOf, scoreText, type EventFilter, type ReplayEvent, type SideNames } from "./events";
 import type { Layers, FrameState } from "./frame-state";
 import type { FrameLoop } from "./loop";
 import { paletteOf, type Palette } from "./palette";
 import { Picture } from "./picture";
 import { Score } from "./score";
+import { nearestInParts, nearestOf } from "./search";
 import { errorText, type ReplayPart, type Source } from "./source";
 import { timeText, type TimeFormat } from "../controls/format";
 
@@ -57,6 +58,8 @@ export interface ViewerEvents {
   readonly partShown: (part: ReplayPart) => void;
   /** A frame was drawn; the drawing can be read until the end of the task. */
   readonly drawn: () => void;
+  /** The visitor asks to open the replay again, after a failure. */
+  readonly openAgain: () => void;
 }
 
 /** One replay on a page. */
@@ -80,6 +83,7 @@ export class Viewer {
   private readonly eventList: EventList;
   private readonly dataTable: DataTable;
   private listedEvents: readonly ReplayEvent[] | null = null;
+  private listedNote = "";
   private frame: FrameState | null = null;
   private isDrawRequested = false;
   private loadingIndex: number | null = null;
@@ -142,7 +146,7 @@ export class Viewer {
         h("p", {}, `The replay could not be loaded: ${errorText(error)}.`),
         button("Try again", () => {
           failure.remove();
-          void this.open(position);
+          this.events.openAgain();
         }),
       );
       this.insertBelowStill(failure);
@@ -157,35 +161,33 @@ export class Viewer {
   }
 
   /** Lists the events of the kinds that are shown. */
-  listEvents(shows: (event: ReplayEvent) => boolean): void {
+  listEvents(shows: EventFilter): void {
     const events = this.allEvents().filter(shows);
+    const isWhole = this.options.steps === null || this.isInCourse(shows);
+    const note = isWhole ? "" : ", loaded parts only";
     const before = this.listedEvents;
-    if (before?.length === events.length && events.every((event, i) => event === before[i])) return;
+    const isSame = before?.length === events.length && events.every((event, i) => event === before[i]);
+    if (isSame && note === this.listedNote) return;
     this.listedEvents = events;
-    const { steps, course, format } = this.options;
-    this.eventList.show(events, format, steps === null || course !== null ? "" : ", loaded parts only");
+    this.listedNote = note;
+    this.eventList.show(events, this.options.format, note);
     this.eventList.update(this.frame?.position ?? 0);
   }
 
   /** The nearest event in a direction; searches further parts of a game if necessary. */
-  async findEvent(
-    from: number,
-    direction: 1 | -1,
-    shows: (event: ReplayEvent) => boolean,
-  ): Promise<ReplayEvent | null> {
-    const isFound = (event: ReplayEvent): boolean =>
-      shows(event) && (direction === 1 ? event.position > from + 1e-4 : event.position < from - 1e-4);
-    const nearest = (events: readonly ReplayEvent[]): ReplayEvent | undefined =>
-      direction === 1 ? events.find(isFound) : events.findLast(isFound);
-    if (this.options.course !== null) return nearest(this.allEvents()) ?? null;
+  async findEvent(from: number, direction: 1 | -1, shows: EventFilter): Promise<ReplayEvent | null> {
     const { source } = this.options;
-    for (let index = source.indexOf(Math.min(from, this.last)); ; index += direction) {
-      const start = source.startOf(index);
-      if (start === null) return null;
+    const searched = { from, direction, shows };
+    if (this.isInCourse(shows)) return nearestOf(this.allEvents(), searched);
+    const load = async (index: number, start: number): Promise<void> => {
       if (!this.partEvents.has(index)) this.addPart(await source.partAt(start));
-      const found = nearest(this.partEvents.get(index) ?? []);
-      if (found !== undefined) return found;
-    }
+    };
+    return nearestInParts(source, () => this.allEvents(), load, searched);
+  }
+
+  /** Are all events of the shown kinds in the course of the game? */
+  private isInCourse(shows: EventFilter): boolean {
+    return this.options.course !== null && courseHas(shows);
   }
 
   get title(): string {

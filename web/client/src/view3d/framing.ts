@@ -14,10 +14,18 @@ export interface Field {
   readonly tanY: number;
 }
 
+/** Least share of a picture's height for the table: a camera for no height, or less, would be nowhere. */
+const LEAST_VISIBLE_SHARE = 0.1;
+
 /** Field of view of a picture with this vertical angle and aspect ratio. */
 export function fieldOf(verticalRad: number, aspect: number): Field {
   const tanY = Math.tan(verticalRad / 2);
   return { tanX: tanY * aspect, tanY };
+}
+
+/** Share of a picture's height for the table, above controls that cover some of it. They may be higher than a low picture. */
+export function visibleShare(height: number, covered: number): number {
+  return Math.max((height - covered) / height, LEAST_VISIBLE_SHARE);
 }
 
 /** Axes of a camera with these angles: to the right, upwards and backwards. */

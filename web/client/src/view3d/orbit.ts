@@ -40,6 +40,8 @@ export class Orbit implements CameraPosition {
   private field: Field = { tanX: 0.4, tanY: 0.25 };
   /** Is the camera where a link has put it? */
   private isOfLink = false;
+  /** Was the camera moved by hand since it was selected? */
+  private isByHand = false;
 
   /** `prefersReducedMotion`: the camera jumps. */
   constructor(
@@ -52,6 +54,7 @@ export class Orbit implements CameraPosition {
 
   preset(camera: Camera): void {
     this.camera = camera;
+    this.isByHand = false;
     const position = cameraPosition(camera, this.arms, this.field);
     // The camera that follows starts from where it looks; `tick` leads it to the puck.
     this.animateTo(camera === "follow" ? { ...position, x: this.x, y: this.y } : position);
@@ -74,7 +77,7 @@ export class Orbit implements CameraPosition {
     this.field = field;
     this.arms = arms;
     this.animationStart = null;
-    if (this.camera === null) {
+    if (this.camera === null || this.isByHand) {
       this.target = this.turned(this.target, 0, 0, factor);
     } else {
       const position = cameraPosition(this.camera, arms, field);
@@ -160,6 +163,7 @@ export class Orbit implements CameraPosition {
   /** Turning and zooming by hand leave the presets, but the camera that follows keeps following. */
   private leavePreset(): void {
     this.isOfLink = false;
+    this.isByHand = true;
     if (this.camera !== "follow") this.camera = null;
   }
 

@@ -6,7 +6,7 @@ import type { Palette } from "../replay/palette";
 import { trailRange, type FrameState, type View } from "../replay/frame-state";
 import { ArmModel } from "./arm";
 import { ContactShadows } from "./contact-shadows";
-import { fieldOf } from "./framing";
+import { fieldOf, visibleShare } from "./framing";
 import { RenderQuality } from "./quality";
 import { Orbit } from "./orbit";
 import { followPointer } from "./pointer";
@@ -82,7 +82,7 @@ export class View3D implements View {
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.setViewOffset(width, height, 0, coveredPx / 2, width, height);
-    this.visibleShare = (height - coveredPx) / height;
+    this.visibleShare = visibleShare(height, coveredPx);
     this.frameCamera();
   }
 
