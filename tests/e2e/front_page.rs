@@ -3,7 +3,7 @@
 use crate::replay::{PREFERS_REDUCED_MOTION, released_evaluation};
 use faceoff_tests::browser::{Browser, Page};
 
-/// JavaScript: does the drawing move, and where is its last body?
+/// JavaScript: does the drawing move?
 const IS_MOVING: &str = "!document.querySelector('[data-highlight] svg').animationsPaused()";
 
 fn click(page: &Page, selector: &str) {
@@ -29,7 +29,7 @@ fn front_page_says_what_it_is_and_who_leads() {
     let replay = replay.as_str().expect("the picture is a link");
     assert!(replay.starts_with(&evaluation), "{replay}");
     page.wait_until(IS_MOVING);
-    let x = "document.querySelector('[data-highlight] .puck').cx.animVal.value";
+    let x = "document.querySelector('[data-highlight] circle.puck').cx.animVal.value";
     let start = page.evaluate(x);
     page.wait_until(&format!("{x} != {start}"));
     click(&page, "[data-highlight-pause]");
@@ -44,7 +44,7 @@ fn front_page_stays_still_for_reduced_motion() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let (server, _) = released_evaluation(scratch.path());
     let browser = Browser::start(scratch.path());
-    let page = browser.open("about:blank");
+    let page = browser.open(&format!("{}/season", server.url));
     page.before_scripts(PREFERS_REDUCED_MOTION);
     page.go_to(&format!("{}/", server.url));
     page.wait_for("[data-highlight-pause]:not([hidden])");
@@ -67,6 +67,6 @@ fn heads_of_the_board_explain_themselves() {
         page.text("#about-points")
             .contains("endanger the real robot")
     );
-    page.press("Escape");
-    page.wait_until(&format!("!{is_shown}"));
+    click(&page, "[popovertarget=about-points]");
+    assert_eq!(page.evaluate(is_shown), false);
 }

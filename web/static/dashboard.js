@@ -1,11 +1,10 @@
 // Script of the dashboards, the signed-in pages of teams and organisers: a progress bar for uploads, drag and drop, forms that are sent
-// once, the time until the next cutoff, and sections that update while work is in progress. Without JavaScript all of it works with forms and reloading.
+// once, and sections that update while work is in progress. Without JavaScript all of it works with forms and reloading.
 
 // Interval between two reloads of a page that shows a validation run or evaluations in progress.
 const RELOAD_INTERVAL_MS = 3000;
-
-// Interval between two updates of the time until the next cutoff.
-const COUNTDOWN_INTERVAL_MS = 10_000;
+// A form that was sent can be sent again after this time.
+const RESEND_AFTER_MS = 10000;
 
 function showStatus(form, text) {
   let line = form.querySelector("[role=status]");
@@ -145,6 +144,8 @@ function sendOnce(event) {
     return;
   }
   form.dataset.sent = "yes";
+  // The visitor may have stopped the browser from waiting for the answer.
+  setTimeout(() => delete form.dataset.sent, RESEND_AFTER_MS);
 }
 
 // After the back button a page may come from the browser's memory: its forms can be sent again.
@@ -152,28 +153,8 @@ function allowSending() {
   for (const form of document.querySelectorAll("form[data-sent]")) delete form.dataset.sent;
 }
 
-// The time until a time, as the server writes it (countdown.rs).
-function timeUntil(milliseconds) {
-  const minutes = Math.ceil(milliseconds / 60_000);
-  if (minutes <= 0) return "now";
-  const hours = Math.floor(minutes / 60);
-  if (hours === 0) return `in ${minutes} min`;
-  const days = Math.floor(hours / 24);
-  if (days === 0) return `in ${hours} h ${minutes % 60} min`;
-  return `in ${days === 1 ? "1 day" : `${days} days`} ${hours % 24} h`;
-}
-
-function updateCountdowns() {
-  for (const element of document.querySelectorAll("[data-countdown]")) {
-    const text = timeUntil(Date.parse(element.dataset.countdown) - Date.now());
-    if (element.textContent !== text) element.textContent = text;
-  }
-}
-
 document.addEventListener("submit", sendOnce);
 addEventListener("pageshow", allowSending);
-updateCountdowns();
-setInterval(updateCountdowns, COUNTDOWN_INTERVAL_MS);
 for (const form of document.querySelectorAll("form[data-upload]")) {
   form.addEventListener("submit", (event) => upload(form, event));
   acceptDrops(form);

@@ -11,6 +11,9 @@ const MAX_RECONNECT_MS = 300000;
 const DEBOUNCE_MS = 200;
 const RANDOM_DELAY_MS = 800;
 
+// Interval between two updates of the time until the next evaluation.
+const COUNTDOWN_INTERVAL_MS = 10000;
+
 const main = document.querySelector("main");
 const topics = main?.dataset.liveTopics;
 // The page of a running game follows the stream of the game instead of the season.
@@ -30,19 +33,21 @@ function addLocalTimes(root) {
   }
 }
 
-// Time until the next evaluation, beside the time itself.
-function showCountdowns() {
-  for (const time of document.querySelectorAll("time[data-countdown]")) {
-    const minutes = Math.ceil((new Date(time.dateTime) - Date.now()) / 60000);
-    let shown = time.parentElement.querySelector(".countdown");
-    if (!shown) {
-      shown = document.createElement("span");
-      shown.className = "countdown";
-      time.after(shown);
-    }
-    const [days, hours] = [Math.floor(minutes / 1440), Math.floor((minutes % 1440) / 60)];
-    const parts = [[days, "d"], [hours, "h"], [days > 0 ? 0 : minutes % 60, "min"]].filter(([count]) => count > 0);
-    shown.textContent = parts.length > 0 ? `, in ${parts.map(([count, unit]) => `${count} ${unit}`).join(" ")}` : "";
+// As the server writes it (countdown.rs).
+function timeUntil(milliseconds) {
+  const minutes = Math.ceil(milliseconds / 60000);
+  if (minutes <= 0) return "now";
+  const hours = Math.floor(minutes / 60);
+  if (hours === 0) return `in ${minutes} min`;
+  const days = Math.floor(hours / 24);
+  if (days === 0) return `in ${hours} h ${minutes % 60} min`;
+  return `in ${days === 1 ? "1 day" : `${days} days`} ${hours % 24} h`;
+}
+
+function updateCountdowns() {
+  for (const element of document.querySelectorAll("[data-countdown]")) {
+    const text = timeUntil(Date.parse(element.dataset.countdown) - Date.now());
+    if (element.textContent !== text) element.textContent = text;
   }
 }
 
@@ -73,8 +78,8 @@ const nameOf = (region) => region.dataset.liveRegion;
 // HTML of the regions as sent by the server, without local times.
 const sentHtml = new Map(regionsOf(document).map((region) => [nameOf(region), region.outerHTML]));
 addLocalTimes(document);
-showCountdowns();
-setInterval(showCountdowns, 30000);
+updateCountdowns();
+setInterval(updateCountdowns, COUNTDOWN_INTERVAL_MS);
 startHighlight();
 
 // Describes an element, so that `find` finds it in the new version of its region.
@@ -104,7 +109,7 @@ function replace(old, next) {
   [...region.querySelectorAll("details")].forEach((details, index) => { if (open[index]) details.open = true; });
   addLocalTimes(region);
   old.replaceWith(region);
-  showCountdowns();
+  updateCountdowns();
   [...region.querySelectorAll(".wide")].forEach((wide, index) => { wide.scrollLeft = scrolled[index] ?? 0; });
 
   const moved = anchor && find(anchor.description, region);

@@ -148,7 +148,7 @@ pub(super) async fn overall(
     let context = Context::new(&board, previous, &course, sort.is_by_rank());
     let groups = context.groups(|row| OverallRow::new(row, &context, &board.weights, &competition));
     let front = match query == BoardPageQuery::default() {
-        true => Some(FrontPage::load(&app, &visibility, &board, (&groups, days.shown)).await?),
+        true => Some(FrontPage::load(&app, &visibility, &board, &groups).await?),
         false => None,
     };
     let page = OverallPage {

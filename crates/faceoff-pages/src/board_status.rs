@@ -1,7 +1,10 @@
 //! Status of boards and stages as text: which results count, who sees them, and whether they are final.
 
 use super::figures::utc_minute;
-use faceoff_api::views::{board::BoardView, stage::PhaseView};
+use faceoff_api::views::{
+    board::{BoardRow, BoardView},
+    stage::PhaseView,
+};
 use faceoff_types::CountingResult;
 
 pub(super) const fn phase_label(phase: PhaseView, is_signed_off: bool) -> &'static str {
@@ -19,6 +22,20 @@ pub(super) fn rows_caption(board: &BoardView) -> String {
     match board.day {
         None => rule,
         Some(day) => format!("{rule}, up to {day}"),
+    }
+}
+
+/// The rank of a row: that of the first one with `=` for teams that are statistically tied.
+pub(super) fn shared_rank(rows: &[BoardRow], row: &BoardRow) -> String {
+    let tied = rows
+        .iter()
+        .filter(|other| other.rank_group == row.rank_group);
+    let (count, first) = tied.fold((0, row.rank), |(count, first), other| {
+        (count + 1, first.min(other.rank))
+    });
+    match count {
+        0 | 1 => row.rank.to_string(),
+        _ => format!("{first}="),
     }
 }
 

@@ -1,4 +1,4 @@
-//! How long it takes until a time, as text. The script of the dashboards keeps it current.
+//! How long it takes until a time, as text. `live.js` keeps it current.
 
 use jiff::Timestamp;
 

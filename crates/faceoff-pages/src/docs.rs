@@ -40,8 +40,9 @@ use serde_json::Value;
 use std::sync::{Arc, OnceLock};
 use tokio::sync::Mutex;
 
-/// Browsers revalidate each page by its ETag, since the frame of a page shows problems of the server.
-const CACHE_CONTROL: &str = "public, no-cache";
+/// Browsers revalidate each page by its ETag, since the frame of a page shows problems of the server. It also names the signed-in user, so
+/// no page is kept for others.
+const CACHE_CONTROL: &str = "private, no-cache";
 /// Longest search query, in characters.
 const MAX_QUERY_CHARS: usize = 200;
 /// Pages for newcomers in reading order, each with its topic.
@@ -385,6 +386,10 @@ fn respond(
         (
             header::CACHE_CONTROL,
             HeaderValue::from_static(CACHE_CONTROL),
+        ),
+        (
+            header::VARY,
+            HeaderValue::from_static("authorization, cookie"),
         ),
     ];
     Ok(match conditions.not_modified(&tag) {

@@ -8,6 +8,7 @@ use super::{
 use faceoff_replay::model::{PUCK, TOOL};
 use faceoff_service::views::highlight::TeamHighlight;
 use faceoff_types::Competition;
+use jiff::civil::Date;
 use std::iter;
 
 /// One position of each body per this number of samples: 25 per second of the episode.
@@ -19,6 +20,7 @@ const SLOWDOWN: f64 = 2.0;
 /// A drawing that moves, in `highlight.html`.
 pub(super) struct HighlightLoop {
     pub(super) team: String,
+    pub(super) day: Date,
     /// What the team achieved, such as "goal".
     pub(super) achievement: String,
     /// Length of the episode, s.
@@ -59,6 +61,7 @@ impl HighlightLoop {
         let info = competition.task(highlight.task)?;
         Some(Self {
             team: found.team.clone(),
+            day: found.day,
             achievement: info.achievement.clone(),
             episode_s: format!(
                 "{:.1}",

@@ -59,10 +59,12 @@ impl KeptForm {
         let is_kept = |name: &str| NOT_KEPT.iter().all(|word| !name.contains(word));
         let fields: Vec<KeptField> = fields
             .into_iter()
-            .filter(|(name, value)| is_kept(name) && !value.is_empty())
+            .filter(|(name, _)| is_kept(name))
             .map(|(name, value)| KeptField { name, value })
             .collect();
-        (!fields.is_empty()).then(|| Self {
+        // Forms require fields that may be empty, so those are kept with the others.
+        let is_typed = fields.iter().any(|field| !field.value.is_empty());
+        is_typed.then(|| Self {
             path: path.to_owned(),
             fields,
         })
@@ -123,7 +125,7 @@ mod tests {
         ];
         let form = KeptForm::new("/dashboard/questions", pairs(&typed)).unwrap();
         let names: Vec<&str> = form.fields.iter().map(|field| &*field.name).collect();
-        assert_eq!(names, ["text"]);
+        assert_eq!(names, ["text", "empty"]);
         assert_eq!(KeptForm::new("/dashboard", pairs(&typed[1..])), None);
     }
 

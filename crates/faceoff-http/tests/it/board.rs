@@ -76,7 +76,7 @@ async fn board_shows_tiers_rates_intervals_points_and_scores() {
     let setting = "evaluation profile, 1000 episodes per task, rules airhockey-2023.3";
     assert!(caption.contains(setting), "{caption}");
     let commitment = site.store.season().await.unwrap().commitment;
-    let legend = texts(&html, ".legend, .legend ~ .note").join(" ");
+    let legend = texts(&html, ".legend, .board ~ .note").join(" ");
     for part in [commitment.as_str(), "Wilson", "0.4 × hit", "at most 0.5,"] {
         assert!(legend.contains(part), "{part:?} is not in the legend");
     }

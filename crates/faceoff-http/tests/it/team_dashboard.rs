@@ -510,7 +510,8 @@ async fn dashboard_shows_rank_tasks_and_next_cutoff() {
     let mut ben = Browser::join(&site, "Ben", role).await;
     let html = dashboard_page(&ben.open("/dashboard").await, 200);
     let tiles = texts(&html, "section[aria-labelledby=result] .tiles dd");
-    assert_eq!(tiles[0], "2 of 2");
+    // As on the board, since chance may have made the difference.
+    assert_eq!(tiles[0], "1= of 2");
     let tasks = texts(&html, ".task-bars dd .figure");
     assert_eq!(tasks, ["50.0 %", "25.0 %", "0.0 %"]);
     let bars = Selector::parse(".task-bars svg.bar").unwrap();

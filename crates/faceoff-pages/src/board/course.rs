@@ -52,7 +52,12 @@ impl Course {
         let scores =
             app.store
                 .day_scores(board.stage, board.revision, &scope, (board.task, first_day));
+        let is_shown = |team: TeamId| board.rows.iter().any(|row| row.team_id == team);
         for DayScore { team, day, score } in scores.await? {
+            // A board of a division leaves teams out.
+            if !is_shown(team) {
+                continue;
+            }
             course.teams.entry(team).or_default().push((day, score));
         }
         Ok(course)
@@ -97,10 +102,12 @@ impl Course {
         })
     }
 
-    /// The chart of the teams in the order of the board; `None` with fewer than two days.
+    /// The chart of the teams by rank, however the rows are sorted; `None` with fewer than two days.
     pub(super) fn chart(&self, board: &BoardView) -> Option<TeamsChart> {
         let span = self.span()?;
-        let teams = board.rows.iter().filter_map(|row| {
+        let mut rows: Vec<_> = board.rows.iter().collect();
+        rows.sort_by_key(|row| row.rank);
+        let teams = rows.into_iter().filter_map(|row| {
             let scores = self.teams.get(&row.team_id)?;
             Some((row.team.as_str(), &scores[..]))
         });

@@ -8,7 +8,7 @@ use faceoff_service::{
     views::{highlight, visibility::Visibility},
 };
 use faceoff_types::{AnnouncementId, Competition, TeamId};
-use jiff::{Timestamp, civil::Date};
+use jiff::Timestamp;
 
 pub(super) struct FrontPage {
     pub(super) title: String,
@@ -20,8 +20,6 @@ pub(super) struct FrontPage {
     pub(super) highlight: Option<HighlightLoop>,
     /// The style sheet of the highlight.
     pub(super) style: &'static str,
-    /// The day of the newest results.
-    pub(super) day: Option<Date>,
     pub(super) tasks: Vec<TaskCard>,
 }
 
@@ -59,11 +57,11 @@ impl FrontPage {
         app: &App,
         visibility: &Visibility,
         board: &BoardView,
-        (groups, day): (&[Group<OverallRow>], Option<Date>),
+        groups: &[Group<OverallRow>],
     ) -> Result<Self, PageProblem> {
         let competition = app.config.competition();
         let highlight = match competition.has_replays {
-            true => highlight::of_board(app, visibility, &board.rows).await?,
+            true => highlight::of_board(app, visibility, &board.rows).await,
             false => None,
         };
         let season = app.store.season().await?;
@@ -83,7 +81,6 @@ impl FrontPage {
                 .as_ref()
                 .and_then(|found| HighlightLoop::new(found, competition)),
             style: assets::EPISODES_STYLE.url(),
-            day,
             tasks: task_cards(competition, board),
         })
     }

@@ -1,7 +1,10 @@
 //! Rows of a board as text, grouped by tier if the competition has tiers.
 
 use super::course::{Course, Sparkline};
-use crate::figures::{self, Rate, TierLabel};
+use crate::{
+    board_status::shared_rank,
+    figures::{self, Rate, TierLabel},
+};
 use faceoff_api::views::{
     board::{BoardRow, BoardView},
     task::TaskView,
@@ -98,8 +101,8 @@ pub(super) struct Context<'a> {
     course: &'a Course,
     has_common_conditions: bool,
     is_by_rank: bool,
-    /// Rank and id of the first team of each rank group with several teams.
-    leaders: BTreeMap<u32, (u32, TeamId)>,
+    /// The first team of each rank group with several teams.
+    leaders: BTreeMap<u32, TeamId>,
 }
 
 impl<'a> Context<'a> {
@@ -117,7 +120,7 @@ impl<'a> Context<'a> {
         groups.retain(|_, rows| rows.len() > 1);
         let leaders = groups.into_iter().filter_map(|(group, rows)| {
             let first = rows.into_iter().min_by_key(|row| row.rank)?;
-            Some((group, (first.rank, first.team_id)))
+            Some((group, first.team_id))
         });
         Self {
             board,
@@ -130,7 +133,7 @@ impl<'a> Context<'a> {
     }
 
     fn tied_with(&self, row: &BoardRow) -> Option<String> {
-        let (_, leader) = self.leaders.get(&row.rank_group)?;
+        let leader = self.leaders.get(&row.rank_group)?;
         let rows = self.board.rows.iter();
         let mut others = rows.filter(|other| other.team_id != row.team_id);
         let leader = others.find(|other| other.team_id == *leader)?;
@@ -171,10 +174,7 @@ impl<'a> Context<'a> {
     fn team_cell(&self, row: &BoardRow) -> TeamCell {
         let tier_change = row.tier_change_probability;
         TeamCell {
-            rank: match self.leaders.get(&row.rank_group) {
-                Some((first_rank, _)) => format!("{first_rank}="),
-                None => row.rank.to_string(),
-            },
+            rank: shared_rank(&self.board.rows, row),
             sparkline: self.course.sparkline(row.team_id),
             change: self.change(row),
             tied_with: self.tied_with(row),

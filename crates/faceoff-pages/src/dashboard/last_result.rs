@@ -1,6 +1,9 @@
 //! The last result of a team: its rank, a bar for each task, and the worst failed episodes.
 
-use crate::{episode_text::plain_end, figures::Rate, replay::page_path, replay_section::Still};
+use crate::{
+    board_status::shared_rank, episode_text::plain_end, figures::Rate, replay::page_path,
+    replay_section::Still,
+};
 use faceoff_api::{requests::BoardQuery, views::board::BoardRow};
 use faceoff_replay::EpisodeLine;
 use faceoff_service::{
@@ -18,7 +21,7 @@ const MAX_FAILED: usize = 3;
 
 /// The team's row of the board.
 pub(super) struct LastResult {
-    pub(super) rank: u32,
+    pub(super) rank: String,
     /// Number of ranked teams.
     pub(super) ranked: usize,
     pub(super) day: Date,
@@ -58,29 +61,28 @@ pub(super) async fn of_team(app: &App, team: TeamId) -> Result<Option<LastResult
         Some((info.title.clone(), Rate::new(result)))
     });
     Ok(Some(LastResult {
-        rank: row.rank,
+        rank: shared_rank(&board.rows, row),
         ranked: board.rows.len(),
         day: row.day,
         evaluation: row.evaluation,
         score: Rate::of_score(row.score, &row.tasks, &board.weights),
         tier: row.tier,
         tasks: tasks.collect(),
-        failed: worst_failed(app, &visibility, row).await?,
+        // Without these pictures, whose errors are in the log, the dashboard still has the rest, such as the upload.
+        failed: worst_failed(app, &visibility, row)
+            .await
+            .unwrap_or_default(),
     }))
 }
 
-/// The failed episodes with the most violations, then with the most late answers: first the worst one of each task, then others. None
+/// The failed episodes with the most violations, then with the most late answers: first the worst one of each task, then others. A problem
 /// if there are no replays, or none any more.
 async fn worst_failed(
     app: &App,
     visibility: &Visibility,
     row: &BoardRow,
 ) -> Result<Vec<FailedEpisode>, Problem> {
-    let clips = match Clips::find(app, visibility, row.evaluation).await {
-        Ok(clips) => clips,
-        Err(problem) if problem.kind().status().is_client_error() => return Ok(Vec::new()),
-        Err(problem) => return Err(problem),
-    };
+    let clips = Clips::find(app, visibility, row.evaluation).await?;
     let mut lines = clips.episodes().await?.episodes;
     lines.retain(|line| !line.success && line.has_clips());
     lines.sort_by_key(|line| Reverse(badness(line)));

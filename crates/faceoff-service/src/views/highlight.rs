@@ -4,12 +4,13 @@ use crate::{
     app::AppState,
     boxed,
     highlight::Highlight,
-    problem::{Problem, ProblemKind},
+    problem::Problem,
     views::{clips::Clips, visibility::Visibility},
 };
 use faceoff_api::views::board::BoardRow;
 use faceoff_replay::{Clip, ClipKey, EpisodeLine, Pack, ReplayError};
 use faceoff_types::{Competition, EvaluationId};
+use jiff::civil::Date;
 use std::{cmp::Reverse, sync::Arc};
 
 /// Teams whose episodes are looked at, from the first of the board on.
@@ -20,43 +21,49 @@ const MAX_TEAMS: usize = 3;
 pub struct TeamHighlight {
     pub team: String,
     pub evaluation: EvaluationId,
+    /// The date of its evaluation day.
+    pub day: Date,
     pub highlight: Arc<Option<Highlight>>,
 }
 
-/// The highlight of a board with these rows; `None` if no success of the first teams is visible to the viewer.
-///
-/// # Errors
-/// If the data cannot be read.
+/// The highlight of a board with these rows; `None` if no success of the first teams is visible to the viewer. Errors
+/// are in the log, and must not take down the page of which the highlight is an ornament.
 #[boxed]
 pub async fn of_board(
     app: &AppState,
     visibility: &Visibility,
     rows: &[BoardRow],
-) -> Result<Option<TeamHighlight>, Problem> {
+) -> Option<TeamHighlight> {
     for row in rows.iter().take(MAX_TEAMS) {
-        let clips = match Clips::find(app, visibility, row.evaluation).await {
-            Ok(clips) => clips,
-            Err(problem) if problem.kind() == ProblemKind::Internal => return Err(problem),
-            // Not yet visible, removed, or never recorded.
-            Err(_) => continue,
-        };
-        let competition = Arc::clone(app.config.competition());
-        let find = async {
-            let found = clips
-                .file
-                .read(move |pack| quickest_success(pack, &competition));
-            Ok::<_, Problem>(Arc::new(found.await?))
-        };
-        let highlight = app.highlights.get(clips.file.key.clone(), find).await?;
-        if highlight.is_some() {
-            return Ok(Some(TeamHighlight {
+        // Not every problem is an error: episodes are not visible before the release, or were removed, or never recorded.
+        if let Ok(highlight) = of_evaluation(app, visibility, row.evaluation).await
+            && highlight.is_some()
+        {
+            return Some(TeamHighlight {
                 team: row.team.to_string(),
                 evaluation: row.evaluation,
+                day: row.day,
                 highlight,
-            }));
+            });
         }
     }
-    Ok(None)
+    None
+}
+
+async fn of_evaluation(
+    app: &AppState,
+    visibility: &Visibility,
+    evaluation: EvaluationId,
+) -> Result<Arc<Option<Highlight>>, Problem> {
+    let clips = Clips::find(app, visibility, evaluation).await?;
+    let competition = Arc::clone(app.config.competition());
+    let find = async {
+        let found = clips
+            .file
+            .read(move |pack| quickest_success(pack, &competition));
+        Ok(Arc::new(found.await?))
+    };
+    app.highlights.get(clips.file.key.clone(), find).await
 }
 
 /// The quickest success of the task with the largest share in the score; of two such tasks, of the one that comes first.
