@@ -1,7 +1,24 @@
 //! The front page in a real browser: what a visitor who has never heard of the competition sees, and what moves.
 
-use crate::replay::{PREFERS_REDUCED_MOTION, released_evaluation};
-use faceoff_tests::browser::{Browser, Page};
+use crate::{CONFIG, Team, evaluation_path, replay::PREFERS_REDUCED_MOTION, start_day};
+use faceoff_tests::{
+    browser::{Browser, Page},
+    bundle,
+    server::Server,
+};
+use std::path::Path;
+
+/// Starts a server and waits for a public evaluation of an agent that succeeds in most episodes, whatever the season's secret is.
+/// Returns the server and the path of the evaluation's page.
+fn evaluated_striker(scratch: &Path) -> (Server, String) {
+    let server = Server::start(&scratch.join("data"), CONFIG);
+    let team = Team::create(&server, "Alpha");
+    let submission = team.submit(&server, &bundle::example_agent("striker", scratch));
+    let path = evaluation_path(&start_day(&server), &submission);
+    let finished = team.wait_until_finished(&server, &path);
+    assert_eq!(finished["state"], "finished", "{finished}");
+    (server, path.replace("/api/v1", ""))
+}
 
 /// JavaScript: does the drawing move?
 const IS_MOVING: &str = "!document.querySelector('[data-highlight] svg').animationsPaused()";
@@ -13,7 +30,7 @@ fn click(page: &Page, selector: &str) {
 #[test]
 fn front_page_says_what_it_is_and_who_leads() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let (server, evaluation) = released_evaluation(scratch.path());
+    let (server, evaluation) = evaluated_striker(scratch.path());
     let browser = Browser::start(scratch.path());
     let page = browser.open(&format!("{}/", server.url));
     assert!(page.text(".summary").contains("play air hockey"));
@@ -42,7 +59,7 @@ fn front_page_says_what_it_is_and_who_leads() {
 #[test]
 fn front_page_stays_still_for_reduced_motion() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let (server, _) = released_evaluation(scratch.path());
+    let (server, _) = evaluated_striker(scratch.path());
     let browser = Browser::start(scratch.path());
     let page = browser.open(&format!("{}/season", server.url));
     page.before_scripts(PREFERS_REDUCED_MOTION);
@@ -56,7 +73,7 @@ fn front_page_stays_still_for_reduced_motion() {
 #[test]
 fn heads_of_the_board_explain_themselves() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let (server, _) = released_evaluation(scratch.path());
+    let (server, _) = evaluated_striker(scratch.path());
     let browser = Browser::start(scratch.path());
     let page = browser.open(&format!("{}/", server.url));
     let is_shown = "document.querySelector('#about-points').checkVisibility()";
