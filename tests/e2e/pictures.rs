@@ -51,7 +51,7 @@ fn pictures_of_pages_are_taken() {
     let browser = Browser::start(scratch.path());
     let board = browser.open(&format!("{}/", server.url));
     let view = View {
-        height: 860,
+        height: 1240,
         ..View::DESKTOP
     };
     save_picture(&board, view, "board.png");

@@ -90,8 +90,8 @@ pub fn competition() -> Competition {
         title: "Robot Air Hockey Challenge".to_owned(),
         short_title: "Robot Air Hockey".to_owned(),
         subject: "robot air hockey".to_owned(),
-        summary: "Teams write programs that play air hockey with a simulated KUKA arm. Every day all of them face the same episodes, \
-                  which nobody has seen before; the board shows who succeeds most often, and who would be safe on a real robot."
+        summary: "Teams write programs that play air hockey with a simulated KUKA arm. Every day all of them face the same new \
+                  episodes; the board shows who succeeds most often, and who would be safe on a real robot."
             .to_owned(),
         rulesets: AirHockeyRuleset::ALL.map(ruleset).into(),
         has_replays: true,

@@ -25,7 +25,7 @@ class FakeRecorder extends EventTarget {
     this.end();
   }
 
-  /** What the browser does at the end, whoever ends it. */
+  /** What the browser does at the end, by its own decision or by that of the visitor. */
   end(): void {
     this.state = "inactive";
     this.dispatchEvent(Object.assign(new Event("dataavailable"), { data: new Blob(["video"]) }));

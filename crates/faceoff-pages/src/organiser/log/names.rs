@@ -90,7 +90,7 @@ impl Names {
 
     /// The author of an event, as the subject of a sentence.
     pub(super) fn actor(&self, event: &EventView) -> String {
-        // Whoever joins or signs in is a visitor until then.
+        // A person who joins or signs in is a visitor until then.
         let is_joining = event.actor == "visitor" && event.subject.starts_with("person:");
         let author = match is_joining {
             true => &event.subject,

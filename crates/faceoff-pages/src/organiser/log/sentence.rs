@@ -4,14 +4,14 @@ use super::names::Names;
 use faceoff_api::views::event::EventView;
 use serde_json::Value;
 
-/// What an event says, for the words of its sentence.
-struct Words<'a> {
+/// An event with the text of its subject.
+struct EventText<'a> {
     event: &'a EventView,
     /// What was changed, such as “Alpha’s evaluation of 2026-03-01”.
     subject: String,
 }
 
-impl Words<'_> {
+impl EventText<'_> {
     /// A field of the event as text; empty if it has none of this name.
     fn field(&self, name: &str) -> String {
         match self.event.details.get(name) {
@@ -33,7 +33,7 @@ impl Words<'_> {
 
 /// The event as a sentence without its full stop: “Anna disqualified Alpha: it read the seed”.
 pub(super) fn sentence(event: &EventView, names: &Names) -> String {
-    let words = Words {
+    let words = EventText {
         event,
         subject: names.subject(&event.subject),
     };
@@ -48,7 +48,7 @@ pub(super) fn sentence(event: &EventView, names: &Names) -> String {
 }
 
 /// What the author did.
-fn predicate(words: &Words<'_>, names: &Names) -> String {
+fn predicate(words: &EventText<'_>, names: &Names) -> String {
     about_access(words, names)
         .or_else(|| about_teams(words, names))
         .or_else(|| about_evaluations(words, names))
@@ -62,7 +62,7 @@ fn predicate(words: &Words<'_>, names: &Names) -> String {
 }
 
 /// Accounts, invitations, tokens and webhooks.
-fn about_access(words: &Words<'_>, names: &Names) -> Option<String> {
+fn about_access(words: &EventText<'_>, names: &Names) -> Option<String> {
     let (subject, name) = (&words.subject, words.field("name"));
     Some(match words.event.kind.as_str() {
         "token_replaced" => format!("replaced the token of {subject}"),
@@ -96,7 +96,7 @@ fn about_access(words: &Words<'_>, names: &Names) -> Option<String> {
 }
 
 /// Teams, registrations, questions and submissions.
-fn about_teams(words: &Words<'_>, names: &Names) -> Option<String> {
+fn about_teams(words: &EventText<'_>, names: &Names) -> Option<String> {
     let subject = &words.subject;
     Some(match words.event.kind.as_str() {
         "team_created" => format!("created the team {}", words.field("name")),
@@ -153,7 +153,7 @@ fn about_teams(words: &Words<'_>, names: &Names) -> Option<String> {
 }
 
 /// Evaluations, days, proposals and ablations.
-fn about_evaluations(words: &Words<'_>, names: &Names) -> Option<String> {
+fn about_evaluations(words: &EventText<'_>, names: &Names) -> Option<String> {
     let subject = &words.subject;
     Some(match words.event.kind.as_str() {
         "evaluation_queued" if !words.field("rerun_of").is_empty() => {
@@ -210,7 +210,7 @@ fn about_evaluations(words: &Words<'_>, names: &Names) -> Option<String> {
 }
 
 /// The season, its stages, the queue and the workers.
-fn about_season(words: &Words<'_>, _: &Names) -> Option<String> {
+fn about_season(words: &EventText<'_>, _: &Names) -> Option<String> {
     let (subject, name) = (&words.subject, words.field("name"));
     Some(match words.event.kind.as_str() {
         "season_named" => format!("named the season “{name}”"),
@@ -248,7 +248,7 @@ fn about_season(words: &Words<'_>, _: &Names) -> Option<String> {
 }
 
 /// Tournaments and their games.
-fn about_tournaments(words: &Words<'_>, names: &Names) -> Option<String> {
+fn about_tournaments(words: &EventText<'_>, names: &Names) -> Option<String> {
     let subject = &words.subject;
     let team = || {
         let team = names.team(&words.field("team"));
