@@ -6,7 +6,7 @@ use faceoff_service::{app::AppState, problem::Problem, views::visibility::Visibi
 use faceoff_store::{BoardScope, DayScore};
 use faceoff_types::TeamId;
 use jiff::{ToSpan, civil::Date};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Calendar days before the board's own that are shown.
 const DAYS: i64 = 59;
@@ -52,10 +52,10 @@ impl Course {
         let scores =
             app.store
                 .day_scores(board.stage, board.revision, &scope, (board.task, first_day));
-        let is_shown = |team: TeamId| board.rows.iter().any(|row| row.team_id == team);
+        let shown: BTreeSet<TeamId> = board.rows.iter().map(|row| row.team_id).collect();
         for DayScore { team, day, score } in scores.await? {
             // A board of a division leaves teams out.
-            if !is_shown(team) {
+            if !shown.contains(&team) {
                 continue;
             }
             course.teams.entry(team).or_default().push((day, score));

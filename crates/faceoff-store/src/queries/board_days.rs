@@ -65,19 +65,15 @@ impl Store {
         let rows = rows
             .fetch_all(&mut *self.database.read.acquire().await?)
             .await?;
-        let score = |row: _| {
-            let (team, day, score): (TeamId, Text<Date>, Option<f64>) = row;
-            // Not every evaluation has each task.
-            score.map(|score| DayScore {
-                team,
-                day: day.0,
-                score: scale * score,
+        // Not every evaluation has each task.
+        let scores = rows.into_iter().filter_map(|row| {
+            Some(DayScore {
+                team: row.team,
+                day: row.day.0,
+                score: scale * row.score?,
             })
-        };
-        Ok(rows
-            .into_iter()
-            .filter_map(|row| score((row.team, row.day, row.score)))
-            .collect())
+        });
+        Ok(scores.collect())
     }
 
     /// The cutoff (the start of the evaluations) of a stage's final day; `None` before it.
