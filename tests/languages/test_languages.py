@@ -75,6 +75,8 @@ def prepare(program, work):
         (work / "wheel/dotnetcore2/bin/dotnet").chmod(0o755)
         (work / "wheel/dotnetcore2/bin").rename(work / "dotnet")
     recipes = (REPOSITORY / "docker/runtimes/debian.toml").read_text()
+    if Path("/usr/share/nodejs").exists():
+        recipes = recipes.replace('"/usr/bin/node",', '"/usr/bin/node", "/usr/share/nodejs",')
     (work / "faceoff.toml").write_text(
         f'{recipes}\n[runtimes.libraries]\nfolder = "{work / "python"}"\n'
         f'[runtimes.dotnet]\nread_only_paths = ["/lib", "/lib64", "/usr/lib", "/usr/lib64", "/etc/ld.so.cache", "{work / "dotnet"}"]\n'

@@ -8,11 +8,12 @@ use std::{fmt, io};
 #[derive(Debug, thiserror::Error)]
 pub enum SandboxError {
     /// A system call that should work did not.
-    #[error("{action}: {source}")]
+    #[error("{action}: {cause}")]
     Io {
         /// The failed action, lower-case, without the reason.
         action: String,
-        source: io::Error,
+        /// Part of the text, so not also a source: a chain of errors would print it twice.
+        cause: io::Error,
     },
     /// The host lacks a layer that the organiser has not disabled.
     #[error("this host cannot provide the layer {layer}: {reason}")]
@@ -25,10 +26,10 @@ pub enum SandboxError {
 
 impl SandboxError {
     /// Wraps an I/O error with the failed action.
-    pub(crate) fn io(action: impl Into<String>, source: impl Into<io::Error>) -> Self {
+    pub(crate) fn io(action: impl Into<String>, cause: impl Into<io::Error>) -> Self {
         Self::Io {
             action: action.into(),
-            source: source.into(),
+            cause: cause.into(),
         }
     }
 
@@ -36,7 +37,7 @@ impl SandboxError {
     pub(crate) fn other(action: impl Into<String>, reason: impl Into<String>) -> Self {
         Self::Io {
             action: action.into(),
-            source: io::Error::other(reason.into()),
+            cause: io::Error::other(reason.into()),
         }
     }
 }
@@ -48,7 +49,7 @@ pub(crate) trait IoContext<T> {
 
 impl<T, E: Into<io::Error>> IoContext<T> for Result<T, E> {
     fn context(self, action: impl fmt::Display) -> Result<T, SandboxError> {
-        self.map_err(|source| SandboxError::io(action.to_string(), source))
+        self.map_err(|cause| SandboxError::io(action.to_string(), cause))
     }
 }
 
