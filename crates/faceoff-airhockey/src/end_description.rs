@@ -11,6 +11,13 @@ use faceoff_types::{AgentFaultKind, EpisodeEnd, Task};
 const HIT: Task = AirHockeyTask::Hit.name();
 const PREPARE: Task = AirHockeyTask::Prepare.name();
 
+/// The beginning of descriptions of hits that passed the goal line below the required speed.
+pub const SLOW_GOAL: &str = "no goal, since it was too slow";
+/// The beginning of descriptions of own goals.
+pub const OWN_GOAL: &str = "own goal";
+/// The beginning of descriptions of pucks that became too fast for the simulation.
+pub const LOST_PUCK: &str = "puck was lost";
+
 /// Describes in one sentence, without a full stop, how the episode ended and what would have been a success.
 ///
 /// `puck` is the puck's last true state in the table frame: x, y (m), yaw (rad), and their rates (m/s, rad/s). `steps` is the number
@@ -76,7 +83,7 @@ fn left_the_table(task: Task, x: f64, y: f64, speed: f64) -> String {
     let y_text = rounded(y);
     if speed > TASK_RULES.lost_speed_m_s {
         return format!(
-            "puck was lost: its speed exceeded {} m/s",
+            "{LOST_PUCK}: its speed exceeded {} m/s",
             TASK_RULES.lost_speed_m_s
         );
     }
@@ -84,7 +91,7 @@ fn left_the_table(task: Task, x: f64, y: f64, speed: f64) -> String {
         let is_too_slow = task == HIT && speed < TASK_RULES.hit_min_goal_speed_m_s;
         let verdict = match (task, is_too_slow) {
             (HIT, false) => "goal",
-            (HIT, true) => "no goal, since it was too slow",
+            (HIT, true) => SLOW_GOAL,
             _ => "puck left through the opponent's goal",
         };
         return format!(
@@ -96,7 +103,7 @@ fn left_the_table(task: Task, x: f64, y: f64, speed: f64) -> String {
     }
     if x < -TABLE.half_length_m() && y.abs() < goal_half_width {
         return format!(
-            "own goal: puck passed x = {} m at y = {y_text} m",
+            "{OWN_GOAL}: puck passed x = {} m at y = {y_text} m",
             rule_value(-TABLE.half_length_m())
         );
     }

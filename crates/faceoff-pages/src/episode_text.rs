@@ -1,7 +1,7 @@
 //! Outcomes and violations of episodes as text. A *violation* is a control step or more in which the robot exceeds a safety limit.
 
 use faceoff_replay::{
-    Contact, ContactWith, EpisodeLine, Group, ViolationSummary,
+    Contact, ContactWith, EpisodeLine, Group, LOST_PUCK, OWN_GOAL, SLOW_GOAL, ViolationSummary,
     model::{PUCK, TABLE},
 };
 use faceoff_types::{Competition, EpisodeEnd};
@@ -55,7 +55,7 @@ pub(super) fn plain_end(line: &EpisodeLine, contacts: &[Contact]) -> String {
     }
     let text = match (task.as_str(), end.as_str(), line.success) {
         ("hit", _, true) => "Goal: the puck went into the opponent’s goal.",
-        ("hit", "left_table", false) if line.why.starts_with("no goal") => {
+        ("hit", "left_table", false) if line.why.starts_with(SLOW_GOAL) => {
             "No goal: the puck went in, but too slowly."
         }
         ("hit", "crossed_middle", false) => return came_back(contacts),
@@ -74,10 +74,10 @@ pub(super) fn plain_end(line: &EpisodeLine, contacts: &[Contact]) -> String {
         ("prepare", "horizon", false) => {
             "The puck was not in a good hitting position when the time was up."
         }
-        (_, "left_table", false) if line.why.starts_with("own goal") => {
+        (_, "left_table", false) if line.why.starts_with(OWN_GOAL) => {
             "Own goal: the puck went into the agent’s goal."
         }
-        (_, "left_table", false) if line.why.starts_with("puck was lost") => {
+        (_, "left_table", false) if line.why.starts_with(LOST_PUCK) => {
             "Lost: the puck was too fast for the simulation."
         }
         (_, "left_table", false) => "Lost: the puck left the table.",

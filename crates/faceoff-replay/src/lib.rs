@@ -31,6 +31,8 @@ pub use clip::Clip;
 pub use clip_index::{ClipIndex, EpisodeLine, TimeBins, ViolationSummary};
 pub use column::Column;
 pub use error::ReplayError;
+/// Beginnings of the descriptions in [`EpisodeLine::why`].
+pub use faceoff_airhockey::{LOST_PUCK, OWN_GOAL, SLOW_GOAL};
 pub use game::{CHUNK_STEPS, GameClipRecorder};
 pub use group::Group;
 pub use header::{

@@ -18,7 +18,8 @@ use faceoff_service::{
     app::App,
     problem::Problem,
     views::{
-        capacity, day, evaluation, health, queue, stage, storage, visibility::Visibility, workers,
+        capacity, day, evaluation, health, pending_decisions, queue, stage, storage,
+        visibility::Visibility, workers,
     },
 };
 use faceoff_store::{RegistrationState, Stage, StagePhase};
@@ -230,11 +231,14 @@ async fn request_items(app: &App) -> Result<Vec<Item>, Problem> {
 async fn failures(app: &App, day: StageDay) -> Result<Vec<Item>, Problem> {
     let visibility = Visibility::for_organiser(app).await?;
     let views = evaluation::day_evaluations(app, &visibility, day).await?;
-    let replaced: BTreeSet<_> = views.iter().filter_map(|view| view.rerun_of).collect();
-    let open = views
+    let evaluations = app.store.evaluations_of_day(day).await?;
+    let to_repeat: BTreeSet<_> = pending_decisions::evaluations_to_repeat(&evaluations)
+        .map(|evaluation| evaluation.id)
+        .collect();
+    let to_repeat = views
         .into_iter()
-        .filter(|view| view.voided.is_none() && !replaced.contains(&view.id));
-    let items = open.filter_map(|view| {
+        .filter(|view| to_repeat.contains(&view.id));
+    let items = to_repeat.filter_map(|view| {
         let (outcome, reason) = match view.status {
             EvaluationStatus::PlatformFailed { reason, .. } => {
                 ("failed because of a platform fault", reason)

@@ -36,14 +36,14 @@ async fn count_now(app: &AppState) -> Result<usize, Problem> {
         }
         if let Some(day) = app.store.newest_day(stage.id).await? {
             let evaluations = app.store.evaluations_of_day(day.stage_day).await?;
-            in_stages += to_repeat(&evaluations).count();
+            in_stages += evaluations_to_repeat(&evaluations).count();
         }
     }
     Ok(registrations + questions + in_stages)
 }
 
 /// Evaluations of a day that have no result through no fault of the agent, and that nothing has replaced yet.
-fn to_repeat(evaluations: &[Evaluation]) -> impl Iterator<Item = &Evaluation> {
+pub fn evaluations_to_repeat(evaluations: &[Evaluation]) -> impl Iterator<Item = &Evaluation> {
     let replaced: BTreeSet<EvaluationId> = evaluations
         .iter()
         .filter_map(|evaluation| evaluation.rerun_of)
