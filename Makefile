@@ -39,7 +39,7 @@ export CARGO_INCREMENTAL := 0
 endif
 DEMO       := $(TARGET_DIR)/demo
 
-.PHONY: channels demo test tests-built tests-of-rust tests-of-python tests-of-api tests-of-agents tests-of-scripts test-release costs web wheel pictures test-api test-python test-learning fuzz busy load route-costs remote-slot crowd objects soak steady frames test-cgroup2 test-box test-engine test-first-hour test-languages lint format fidelity setup setup-test agents dist clean-demo help
+.PHONY: channels demo test tests-built tests-of-rust tests-of-python tests-of-api tests-of-agents tests-of-scripts test-release costs web wheel pictures test-api test-python test-python-versions test-learning fuzz busy load route-costs remote-slot crowd objects soak steady frames test-cgroup2 test-box test-engine test-first-hour test-languages lint format fidelity setup setup-test agents dist clean-demo help
 
 help:
 	@echo "make demo   run a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
@@ -52,6 +52,7 @@ help:
 	@echo "make wheel  build the Python package: $(TARGET_DIR)/wheels"
 	@echo "make test-api   validate the OpenAPI document, call every operation, generate two clients"
 	@echo "make test-python   build the Python package, install it in an empty environment, test it"
+	@echo "make test-python-versions   test that package with Python 3.13 and 3.14, in the files of newer Debian releases"
 	@echo "make test-learning   train the learning examples from scratch, and test the libraries that need torch (8 GB)"
 	@echo "make test-cgroup2   test the sandbox's limits on cgroup v2, in a virtual machine without v1"
 	@echo "make test-box   build the images' file systems without a container engine, and start the programs in them"
@@ -179,6 +180,11 @@ test-python: setup-test
 	$(CARGO) build --locked --workspace --bins --tests
 	tests/runtimes.sh "$(TARGET_DIR)"
 	TARGET_DIR="$(TARGET_DIR)" crates/faceoff-py/test.sh test
+
+# Debian's next release changes from day to day, so this is no part of `make test`. As root.
+test-python-versions: test-python
+	@docker/setup.sh python-versions
+	TARGET_DIR="$(TARGET_DIR)" tests/python-versions.sh
 
 # Takes long and gigabytes: trains the examples again, with Stable-Baselines3 and LeRobot.
 test-learning: agents

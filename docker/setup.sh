@@ -10,6 +10,7 @@
 #   docker/setup.sh box      also tools to build images without a container engine
 #   docker/setup.sh first-hour   also tools to make a Debian and its network
 #   docker/setup.sh languages    also the languages of agents
+#   docker/setup.sh python-versions   also a tool to make the files of a Debian release
 #   docker/setup.sh engine   also Docker, tools for its base images, and other tools that save images
 #
 # As root it installs them with apt-get; otherwise it prints the command and fails.
@@ -71,6 +72,9 @@ fi
 if [ "$purpose" = first-hour ]; then
     need debootstrap debootstrap
     need ip iproute2
+fi
+if [ "$purpose" = python-versions ]; then
+    need mmdebstrap mmdebstrap
 fi
 if [ "$purpose" = languages ]; then
     need g++ g++

@@ -5,8 +5,9 @@
 #   test.sh test [...]  a wheel of the development build for this host's glibc, like the programs it is compared with; runs
 #                       pytest on it, with the remaining arguments
 #   test.sh learning    the wheel with libraries that need torch; repeats the training of the examples
-#   test.sh versions    the environments' tests on the wheel in TARGET/wheels, with each interpreter of PYTHONS
-# TARGET_DIR (default: target), PYTHON (default: python3) and PYTHONS (default: PYTHON) may be set.
+#   test.sh versions    the tests on the wheel in WHEELS, with each interpreter of PYTHONS (tests/python-versions.sh)
+# TARGET_DIR (default: target), PYTHON (default: python3), PYTHONS (default: PYTHON) and WHEELS (default: TARGET/wheels) may be set,
+# and for `versions` GYMNASIUM, such as ==1.1.1.
 #
 # Programs of an environment are started through its interpreter: shebang lines do not work with a space in the path.
 set -eu
@@ -63,14 +64,18 @@ case ${1:-} in
         for interpreter in ${PYTHONS:-$python}; do
             rm -rf "$target/python-version"
             "$interpreter" -m venv "$target/python-version"
-            "$target/python-version/bin/python" -m pip install --quiet --disable-pip-version-check \
-                "$target"/wheels/*.whl "gymnasium${GYMNASIUM:-}" pettingzoo pytest
+            # Of the libraries, those that have a wheel for this version; tests of the others are skipped.
+            sed 's/ *#.*//' "$here/requirements-test.txt" | while read -r requirement; do
+                "$target/python-version/bin/python" -m pip install --quiet --disable-pip-version-check --no-compile \
+                    "$requirement" > "$target/python-version/log" 2>&1 || echo "not installed: $requirement"
+            done
+            "$target/python-version/bin/python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps \
+                "${WHEELS:-$target/wheels}"/*.whl
+            [ -z "${GYMNASIUM:-}" ] || "$target/python-version/bin/python" -m pip install --quiet "gymnasium$GYMNASIUM"
             cd "$target"
             "$target/python-version/bin/python" -VV
-            "$target/python-version/bin/python" -m pytest --quiet -p no:cacheprovider --rootdir "$here" \
-                "$here/tests/test_gym_env.py" "$here/tests/test_gym_vector.py" "$here/tests/test_game.py" \
-                "$here/tests/test_bad_input.py" "$here/tests/test_processes.py" "$here/tests/test_game_vector.py" \
-                "$here/tests/test_sb3.py" "$here/tests/test_gym_mallet.py" "$here/tests/test_kinematics_native.py"
+            TARGET_DIR="$target" FACEOFF_BIN="${FACEOFF_BIN:-$target/debug/faceoff}" \
+                "$target/python-version/bin/python" -m pytest --quiet -p no:cacheprovider -rs --rootdir "$here" "$here/tests"
         done
         ;;
     *)
