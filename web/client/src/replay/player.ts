@@ -210,7 +210,8 @@ export class Player {
     panel.append(this.kinds.element, help, this.statusLine);
     const together = section.closest(".together");
     together?.append(panel);
-    together?.after(pairs);
+    // At the end: what is already shown keeps its place.
+    together?.parentElement?.append(pairs);
     if (this.oneTable !== null) first.screen.prepend(this.oneTable.legend);
   }
 
