@@ -10,7 +10,7 @@ const SOLID: number[] = [];
 /** Size of the halo relative to the puck, its least radius in pixels, and its opacity. */
 const HALO = { size: 1.9, leastRadius: 9, opacity: 0.22 };
 
-/** Draws the puck with a halo that makes it visible in small pictures: a disc, or of a ghost its outline. */
+/** Draws the puck: a disc with a halo that makes it visible in small pictures, or of a ghost its outline. */
 export function drawPuck(
   context: CanvasRenderingContext2D,
   at: Projection,
@@ -20,18 +20,18 @@ export function drawPuck(
 ): void {
   const { x, y, yaw } = pose;
   const radius = at.length(MODEL.puck.radius_m);
-  const colour = palette[look === "ghost" ? "rp-ghost" : "rp-puck"];
-  context.fillStyle = colour;
-  context.globalAlpha = HALO.opacity;
-  disc(context, at.x(x), at.y(y), Math.max(radius * HALO.size, HALO.leastRadius));
-  context.fill();
-  context.globalAlpha = 1;
-  disc(context, at.x(x), at.y(y), radius);
   if (look === "ghost") {
-    context.strokeStyle = colour;
+    context.strokeStyle = palette["rp-ghost"];
     context.lineWidth = 2;
+    disc(context, at.x(x), at.y(y), radius);
     context.stroke();
   } else {
+    context.fillStyle = palette["rp-puck"];
+    context.globalAlpha = HALO.opacity;
+    disc(context, at.x(x), at.y(y), Math.max(radius * HALO.size, HALO.leastRadius));
+    context.fill();
+    context.globalAlpha = 1;
+    disc(context, at.x(x), at.y(y), radius);
     context.fill();
     context.strokeStyle = palette["rp-table"];
     context.lineWidth = Math.max(radius * 0.18, 1);
