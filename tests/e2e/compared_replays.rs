@@ -174,15 +174,15 @@ fn two_episodes_are_drawn_on_one_table() {
     assert_eq!(pixels_of(&page, "rp-ghost"), 0);
     assert_eq!(page.console_errors(), [""; 0]);
 
-    link_shows_one_table(&browser, &url);
+    link_shows_one_table(&browser, &server, &url);
     let without_scripts = browser.open_in(View::DESKTOP.without_scripts(), &url);
     let stills = without_scripts.evaluate("document.querySelectorAll('.still svg').length");
     assert_eq!(stills, 2);
 }
 
 /// On a phone, for a visitor who prefers reduced motion.
-fn link_shows_one_table(browser: &Browser, url: &str) {
-    let page = browser.open_in(HANDHELD, "about:blank#");
+fn link_shows_one_table(browser: &Browser, server: &Server, url: &str) {
+    let page = browser.open_in(HANDHELD, &format!("{}/", server.url));
     page.before_scripts(PREFERS_REDUCED_MOTION);
     page.go_to(&format!("{url}#t=9&ghost=1"));
     page.wait_for(".one-table #replay-a[data-state=ready][data-step='9']");

@@ -110,7 +110,7 @@ fn space_scrolls_a_focused_table_that_can_scroll() {
                 new KeyboardEvent('keydown', { key: ' ', bubbles: true, cancelable: true }));
         })()",
     );
-    page.wait_until("document.querySelector('#replay .data td').checkVisibility()");
+    page.wait_until("document.querySelector('#replay .data [aria-current] td').checkVisibility()");
     assert!(
         !plays_after(&page, "space()"),
         "the columns do not fit: the table scrolls"
