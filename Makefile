@@ -271,7 +271,7 @@ pictures: setup-test
 # CPU time of the replay script. It depends on the machine, so no other test checks it.
 frames: setup-test
 	$(CARGO) build --locked --workspace --bins --tests
-	$(CARGO) test --locked --workspace --test e2e replay::frames_need_little_script_time -- --include-ignored --nocapture
+	$(CARGO) test --locked --workspace --test e2e frame_costs:: -- --include-ignored --nocapture
 
 lint:
 	python3 tests/words/words.py

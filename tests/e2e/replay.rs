@@ -1,11 +1,7 @@
 //! Replays of episodes in a real browser, compared with the server's *clips*. A clip is the recorded motion of an episode, in
 //! *samples* at equal intervals.
 
-use crate::{
-    CONFIG, Team,
-    axe::{axe_script, faults},
-    evaluation_path, start_day,
-};
+use crate::{CONFIG, Team, evaluation_path, start_day};
 use faceoff_replay::Clip;
 use faceoff_tests::{
     browser::{Browser, Page, View},
@@ -28,7 +24,7 @@ pub fn released_evaluation(scratch: &Path) -> (Server, String) {
 }
 
 /// Moves the replay's slider to a sample, and waits until the sample is drawn.
-fn show_sample(page: &Page, sample: usize) {
+pub fn show_sample(page: &Page, sample: usize) {
     let _ = page.evaluate(&format!(
         "(() => {{
             const slider = document.querySelector('#replay input[type=range]');
@@ -46,7 +42,7 @@ fn show_sample(page: &Page, sample: usize) {
 }
 
 /// Presses the button with this text.
-fn press(page: &Page, name: &str) {
+pub fn press(page: &Page, name: &str) {
     let pressed = page.evaluate(&format!(
         "(() => {{
             const button = [...document.querySelectorAll('#replay button')]
@@ -65,18 +61,6 @@ pub const PREFERS_REDUCED_MOTION: &str = "
         ? { matches: true, addEventListener() {} }
         : original.call(window, query);
 ";
-
-/// Whether the replay plays after an action, which is an expression.
-fn plays_after(page: &Page, action: &str) -> bool {
-    let label = page.evaluate(&format!(
-        "(() => {{
-            {action};
-            return new Promise(drawn => requestAnimationFrame(() => requestAnimationFrame(() =>
-                drawn(document.querySelector('#replay .transport .main').getAttribute('aria-label')))));
-        }})()"
-    ));
-    label == "Pause"
-}
 
 /// The pixels with the puck's colour in the flat view: x and y of their centre, and their number.
 fn puck_pixels(page: &Page) -> [f64; 3] {
@@ -262,86 +246,6 @@ fn picture_and_its_controls_fit_the_window() {
 }
 
 #[test]
-fn space_and_clicks_play_and_drags_do_not() {
-    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let (server, evaluation) = released_evaluation(scratch.path());
-    let browser = Browser::start(scratch.path());
-    let page = browser.open(&format!("{}{evaluation}/episodes/defend/0", server.url));
-    page.wait_for("#replay[data-state=ready]");
-    let _ = page.evaluate(
-        "(() => {
-            const speed = document.querySelector('#replay select[aria-label=Speed]');
-            speed.value = '0.1';
-            speed.dispatchEvent(new Event('change'));
-            window.space = target => target.dispatchEvent(
-                new KeyboardEvent('keydown', { key: ' ', bubbles: true, cancelable: true }));
-            const area = document.querySelector('#replay .canvas-area');
-            const at = (kind, x) => area.dispatchEvent(
-                new PointerEvent(kind, { clientX: x, clientY: 300, button: 0, bubbles: true }));
-            window.clickPicture = moved => { at('pointerdown', 300); at('pointermove', 300 + moved);
-                at('pointerup', 300 + moved); area.click(); };
-        })()",
-    );
-    assert!(plays_after(&page, "space(document.body)"));
-    assert!(!plays_after(&page, "space(document.querySelector('h1'))"));
-    assert!(!plays_after(
-        &page,
-        "space(document.querySelector('.lead a'))"
-    ));
-    assert!(!plays_after(
-        &page,
-        "space(document.querySelector('#replay select'))"
-    ));
-    assert!(plays_after(&page, "clickPicture(2)"));
-    assert!(
-        plays_after(&page, "clickPicture(60)"),
-        "a drag turns the camera"
-    );
-    assert!(!plays_after(&page, "clickPicture(0)"));
-    assert_eq!(page.console_errors(), [""; 0]);
-}
-
-#[test]
-fn link_to_a_moment_restores_the_view_and_plays() {
-    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let (server, evaluation) = released_evaluation(scratch.path());
-    let browser = Browser::start(scratch.path());
-    let url = format!("{}{evaluation}/episodes/hit/0", server.url);
-    let linked = browser.open(&format!("{url}#t=7&flat=1"));
-    linked.wait_for("#replay[data-state=ready][data-view=flat]");
-    linked.wait_until("Number(document.querySelector('#replay').dataset.step) > 7");
-
-    let page = browser.open(&format!("{}/", server.url));
-    page.before_scripts(PREFERS_REDUCED_MOTION);
-    let fragment = "#t=9&cam=-0.1_0_0.05_-1.3_0.6_3.1&speed=2&paths=puck&trail=all&arm=2";
-    page.go_to(&format!("{url}{fragment}"));
-    page.wait_for("#replay[data-state=ready][data-step='9']");
-    let found = page.evaluate(
-        "(() => {
-            Object.defineProperty(navigator, 'clipboard', { value: undefined });
-            [...document.querySelectorAll('#replay button')]
-                .find(button => button.textContent == 'Copy link to this moment').click();
-            return new Promise(done => setTimeout(() => done({
-                link: document.querySelector('#replay .address').value,
-                speed: document.querySelector('#replay select[aria-label=Speed]').value,
-                layers: document.querySelectorAll('#replay .layers input:checked').length,
-                arm: document.querySelector('#replay .strips select').selectedIndex,
-                playing: document.querySelector('#replay .transport .main').getAttribute('aria-label'),
-                isInView: document.querySelector('#replay .screen').getBoundingClientRect().top < innerHeight / 2,
-            })));
-        })()",
-    );
-    let expected = json!({
-        "link": format!("{url}{fragment}"), "speed": "2", "layers": 1, "arm": 1, "playing": "Play", "isInView": true,
-    });
-    assert_eq!(found, expected);
-    // Bad values are ignored.
-    page.go_to(&format!("{url}?#t=x&cam=1_2&paths=moon&arm=7"));
-    page.wait_for("#replay[data-state=ready][data-step='0']");
-    assert_eq!(page.console_errors(), [""; 0]);
-}
-
-#[test]
 fn missing_episode_is_reported_as_not_found() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let (server, evaluation) = released_evaluation(scratch.path());
@@ -358,67 +262,6 @@ fn missing_episode_is_reported_as_not_found() {
         "{}",
         missing_page.text("h1")
     );
-}
-
-#[test]
-fn compared_replays_show_same_sample() {
-    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let server = Server::start(&scratch.path().join("data"), CONFIG);
-    let teams = ["Alpha", "Beta"].map(|name| Team::create(&server, name));
-    let submissions = teams
-        .each_ref()
-        .map(|team| team.submit(&server, &repository().join("agents/hold")));
-    let day = start_day(&server);
-    let [left_page, right_page] = [0, 1].map(|index: usize| {
-        let path = evaluation_path(&day, &submissions[index]);
-        let finished = teams[index].wait_until_finished(&server, &path);
-        assert_eq!(finished["state"], "finished", "{finished}");
-        path.replace("/api/v1", "")
-    });
-    let right_id = right_page
-        .rsplit('/')
-        .next()
-        .expect("the path ends with the id");
-    let browser = Browser::start(scratch.path());
-    let page = browser.open(&format!(
-        "{}{left_page}/compare/{right_id}/defend/1",
-        server.url
-    ));
-    page.wait_until("document.querySelectorAll('.replay[data-state=ready]').length == 2");
-    let _ = page.evaluate(
-        "(() => {
-            const slider = document.querySelector('.shared-controls input[type=range]');
-            slider.value = 12;
-            slider.dispatchEvent(new Event('input', { bubbles: true }));
-        })()",
-    );
-    page.wait_until(
-        "[...document.querySelectorAll('section.replay')].every(replay => replay.dataset.step == '12')",
-    );
-    // On a phone both pictures and their only controls are in view at once.
-    page.set_view(View {
-        width: 390,
-        height: 844,
-        ..View::DESKTOP
-    });
-    let visible = page.evaluate(
-        "new Promise(done => requestAnimationFrame(() => {
-            document.querySelector('.together').scrollIntoView();
-            const boxes = ['#replay-a .screen', '#replay-b .screen', '.shared-controls .controls']
-                .map(selector => document.querySelector(selector).getBoundingClientRect());
-            done([document.querySelectorAll('input[type=range]').length,
-                boxes.every(box => box.top >= 0 && box.bottom <= innerHeight && box.height > 50)]);
-        }))",
-    );
-    assert_eq!(visible, json!([1, true]));
-    page.set_view(View::DESKTOP);
-    // axe-core finds violations of accessibility rules.
-    let axe = axe_script();
-    let mut found = faults(&page, &axe, "an episode twice");
-    page.set_view(View::DESKTOP);
-    page.go_to(&format!("{}{left_page}/compare/{right_id}", server.url));
-    found.extend(faults(&page, &axe, "a comparison"));
-    assert!(found.is_empty(), "{}", found.join("\n"));
 }
 
 #[test]
@@ -463,41 +306,4 @@ fn repeatedly_opened_replays_leak_no_memory() {
     let (first, last) = (max(&heap_bytes[..10]), max(&heap_bytes[10..]));
     assert!(last < 1.2 * first, "bytes used by scripts: {heap_bytes:?}");
     assert_eq!(page.console_errors(), [""; 0]);
-}
-
-/// CPU time of scripts that 19 of 20 frames may take, in milliseconds per frame.
-const MAX_FRAME_MS: f64 = 4.0;
-
-#[test]
-#[ignore = "its verdict depends on the speed of the machine; `make frames` runs it"]
-#[expect(clippy::print_stdout, reason = "it prints its measurements")]
-fn frames_need_little_script_time() {
-    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let (server, evaluation) = released_evaluation(scratch.path());
-    let browser = Browser::start(scratch.path());
-    let page = browser.open(&format!("{}{evaluation}/episodes/defend/0", server.url));
-    page.wait_for("#replay[data-state=ready]");
-    let samples = page.evaluate("document.querySelector('#replay input[type=range]').max");
-    let samples = samples.as_str().and_then(|text| text.parse().ok());
-    let samples: usize = samples.expect("the slider has an end");
-    // The first pass creates cached objects and is not measured.
-    let mut frame_times_ms = Vec::new();
-    for pass in 0..2 {
-        for sample in (0..samples).rev() {
-            let before = page.script_cpu_s();
-            show_sample(&page, sample);
-            if pass > 0 {
-                frame_times_ms.push(1e3 * (page.script_cpu_s() - before));
-            }
-        }
-    }
-    frame_times_ms.sort_by(f64::total_cmp);
-    let percentile = |percent: usize| frame_times_ms[(frame_times_ms.len() - 1) * percent / 100];
-    println!(
-        "script per frame, ms of CPU: median {:.2}, 95th percentile {:.2}, of {} frames",
-        percentile(50),
-        percentile(95),
-        frame_times_ms.len()
-    );
-    assert!(percentile(95) <= MAX_FRAME_MS, "{frame_times_ms:?}");
 }

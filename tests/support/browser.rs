@@ -372,7 +372,7 @@ impl Page<'_> {
         html.as_str().unwrap_or_default().to_owned()
     }
 
-    /// Presses a key, as `Tab` or `Enter`.
+    /// Presses a key, as `Tab`, `Enter` or a space.
     ///
     /// # Panics
     /// If the browser has ended.
@@ -381,6 +381,7 @@ impl Page<'_> {
             let code = match key {
                 "Tab" => 9,
                 "Enter" => 13,
+                " " => 32,
                 _ => 0,
             };
             let pressed =

@@ -8,7 +8,7 @@ import { actionFor, type KeyActions } from "../src/controls/keys";
 import { Clock } from "../src/replay/clock";
 import { columnName, csvOf } from "../src/replay/csv";
 import { courseEvents, courseHas, courseScore, parseCourse } from "../src/replay/course";
-import { endText, eventsOf, scoreText } from "../src/replay/events";
+import { endText, eventsOf, rallyEvents, scoreText } from "../src/replay/events";
 import { parseFragment, writeFragment, type LinkTarget } from "../src/replay/fragment";
 import { Score } from "../src/replay/score";
 import { Source } from "../src/replay/source";
@@ -114,6 +114,9 @@ describe("a link to a moment", () => {
       "#t=5&cam=-0.27_0_0.08_-1.234_0.5_3.25&paths=puck_commanded&trail=all&arm=2&hide=contact_late",
     );
     expect(parseFragment(fragment)).toEqual(target);
+    expect(parseFragment("#t=5&ghost=1")).toEqual({ step: 5, ghost: true });
+    expect(writeFragment({ step: 5, flat: true, ghost: true })).toBe("#t=5&flat=1&ghost=1");
+    expect(writeFragment({ step: 5, ghost: false })).toBe("#t=5");
     const nothing = { puck: false, mallet: false, commanded: false, seen: false, wholePart: false };
     expect(parseFragment(writeFragment({ step: 0, layers: nothing, hiddenKinds: [] }))).toEqual({
       step: 0,
@@ -125,7 +128,9 @@ describe("a link to a moment", () => {
   it("ignores unknown fields and bad values", () => {
     expect(parseFragment("#main")).toEqual({});
     expect(parseFragment("#t=-1&cam=moon&speed=3&x=%")).toEqual({});
-    expect(parseFragment("#t=1e9&cam=1_2_3&paths=puck_moon&arm=3&flat=2&trail=x&hide=end")).toEqual({});
+    expect(parseFragment("#t=1e9&cam=1_2_3&paths=puck_moon&arm=3&flat=2&ghost=yes&trail=x&hide=end")).toEqual(
+      {},
+    );
     expect(parseFragment("#cam=9_0_0_0_0_1")).toEqual({});
     expect(parseFragment("#t=Infinity&cam=0_0_0_0_NaN_1&speed=")).toEqual({});
   });
@@ -156,6 +161,19 @@ describe("events", () => {
       [3, "Success: at rest behind the line"],
     ]);
     expect(events.at(-1)?.symbol).toBe("✓");
+  });
+
+  it("say why a third foul gives a point", () => {
+    const foul = (sample: number, a: number, b: number) =>
+      ({ sample, what: "foul", by: 0, score: [a, b] }) as const;
+    const texts = (start: readonly [number, number] | null) =>
+      rallyEvents([foul(10, 4, 0), foul(20, 4, 1)], ["Alpha", "Beta"], start).map((event) => event.text);
+    const reason = "foul by Alpha: the puck stayed too long on its side";
+    const point = "; every third foul is a point for Beta";
+    expect(texts([4, 0])).toEqual([`${reason}, 4 : 0`, `${reason}${point}, 4 : 1`]);
+    // Whether the first foul has changed the score is unknown without the score before it.
+    expect(texts(null)).toEqual([`${reason}, 4 : 0`, `${reason}${point}, 4 : 1`]);
+    expect(texts([3, 0])[0]).toBe(`${reason}, 4 : 0`);
   });
 
   it("describe the end also without a reason", () => {
@@ -200,7 +218,7 @@ describe("the course of a game", () => {
         "keeper: end effector out of bounds, joint velocity beyond 95 % of its limit (3 times)",
       ],
       ["goal", 100, "goal by striker, 1 : 0"],
-      ["foul", 900, "foul by keeper, 1 : 0"],
+      ["foul", 900, "foul by keeper: the puck stayed too long on its side, 1 : 0"],
       ["goal", 1200, "goal by keeper, 1 : 1"],
     ]);
     expect([100, 101, 1200, 1201].map((position) => scoreText(courseScore(course, position), names))).toEqual(

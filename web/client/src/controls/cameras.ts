@@ -45,10 +45,12 @@ export class Cameras {
     this.orbitButtons = h(
       "span",
       { class: "button-group", attributes: { role: "group", "aria-label": "Turn the camera" } },
+      h("span", { class: "button-name" }, "Turn"),
       turn("Turn left", -1, 0, ICONS.left),
       turn("Turn right", 1, 0, ICONS.right),
       turn("Turn up", 0, 1, ICONS.up),
       turn("Turn down", 0, -1, ICONS.down),
+      h("span", { class: "button-name" }, "Zoom"),
       button("Zoom in", () => { actions.zoom(1); }, ICONS.closer),
       button("Zoom out", () => { actions.zoom(-1); }, ICONS.farther),
     ); // prettier-ignore

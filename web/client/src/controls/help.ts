@@ -28,7 +28,7 @@ export function helpDialog(): HTMLDialogElement {
     "dialog",
     { class: "help", attributes: { "aria-label": "Keys of the replay" } },
     h("h2", {}, "Keys"),
-    list([["Space", "play, pause: everywhere on the page"]]),
+    list([["Space", "play, pause: everywhere on the page, except in what scrolls"]]),
     h("p", {}, "For the other keys, click the picture (or tab to it) first."),
     list(PICTURE_SHORTCUTS),
     h(

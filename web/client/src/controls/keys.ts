@@ -83,5 +83,26 @@ function focusOf(target: Element, isInside: boolean): Focus {
   if (target.closest("select, textarea, video, audio, iframe, [contenteditable]") !== null) return "other";
   if (target.closest("button, summary, a, label, [role=button]") !== null)
     return isInside ? "button" : "other";
-  return isInside && target.classList.contains("canvas-area") ? "picture" : "page";
+  if (isInside && target.classList.contains("canvas-area")) return "picture";
+  return isInScroller(target) ? "other" : "page";
+}
+
+/** Is an element in a part of the page with a scroll position of its own? There the keys scroll. */
+function isInScroller(element: Element): boolean {
+  for (let part: Element | null = element; part !== null; part = part.parentElement) {
+    // These scroll the page, or all that is shown of it.
+    if (part === document.body || part === document.fullscreenElement) return false;
+    if (canScroll(part)) return true;
+  }
+  return false;
+}
+
+function canScroll(element: Element): boolean {
+  const { overflowX, overflowY } = getComputedStyle(element);
+  const scrolls = (overflow: string): boolean => overflow === "auto" || overflow === "scroll";
+  // Sizes in whole pixels may differ by one without anything to scroll.
+  return (
+    (scrolls(overflowY) && element.scrollHeight > element.clientHeight + 1) ||
+    (scrolls(overflowX) && element.scrollWidth > element.clientWidth + 1)
+  );
 }

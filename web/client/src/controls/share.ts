@@ -13,10 +13,11 @@ interface Actions {
   readonly announce: (text: string) => void;
 }
 
-/** The row of buttons below the picture. */
+/** The row of buttons below the picture, with what went wrong. */
 export class ShareRow {
   readonly element: HTMLElement;
   private readonly video: HTMLButtonElement | null;
+  private readonly problem = h("p", { class: "problem", attributes: { role: "alert", hidden: "" } });
 
   constructor(actions: Actions) {
     const address = h("input", {
@@ -49,11 +50,19 @@ export class ShareRow {
       button("Save picture", actions.save),
       this.video,
       button("Keys", actions.help),
+      this.problem,
     );
+  }
+
+  /** Shows why something could not be saved, until the next recording starts. */
+  showProblem(text: string): void {
+    this.problem.textContent = text;
+    this.problem.hidden = false;
   }
 
   showRecording(isRecording: boolean): void {
     if (this.video === null) return;
+    if (isRecording) this.problem.hidden = true;
     this.video.textContent = isRecording ? "Stop and save video" : "Record video";
     this.video.setAttribute("aria-pressed", String(isRecording));
   }

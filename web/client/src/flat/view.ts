@@ -1,25 +1,22 @@
 // The flat view: everything from above, on a 2-D canvas.
 
 import type { Contest } from "../clip/motion";
-import { MODEL } from "../model/model";
 import { pointsBetween, type Path } from "../motion/paths";
 import { freshness, OPACITY_EXPONENT, WIDTH_EXPONENT } from "../motion/taper";
 import type { Palette } from "../replay/palette";
 import { trailRange, type FrameState, type View } from "../replay/frame-state";
-import { drawArm, drawMallet, type ArmColours } from "./arm";
+import { drawArm, drawArmOutline, drawMallet, type ArmColours } from "./arm";
 import { Projection } from "./projection";
+import { drawPuck, drawSeenPuck } from "./puck";
 import { drawTable } from "./table";
 
 // Patterns of dashes: lengths of dash and gap, pixels.
 const COMMANDED_DASHES = [5, 3];
-const SEEN_DASHES = [4, 3];
 const SOLID: number[] = [];
 /** Width of a trail at its new end, pixels. */
 const TRAIL_WIDTH = 3;
 /** A trail is drawn in this number of parts, each of one width and opacity. */
 const TRAIL_PARTS = 12;
-/** Size of the halo relative to the puck, its least radius in pixels, and its opacity. */
-const HALO = { size: 1.9, leastRadius: 9, opacity: 0.22 };
 
 /** The table from above, to scale, with its axes. Needs no WebGL. */
 export class FlatView implements View {
@@ -27,11 +24,14 @@ export class FlatView implements View {
   private readonly context: CanvasRenderingContext2D;
   /** The static parts, drawn once and copied into each frame. */
   private readonly background = document.createElement("canvas");
+  /** The arm of a ghost, drawn alone: its outline is made by erasing. */
+  private readonly ghostArm = document.createElement("canvas");
   private projection = new Projection(1, 1);
   /** Device pixels per CSS pixel. */
   private ratio = 1;
   private palette: Palette | null = null;
   private arms: readonly [ArmColours, ArmColours] | null = null;
+  private ghost: ArmColours | null = null;
   private backgroundContest: Contest | null = null;
 
   constructor() {
@@ -41,7 +41,7 @@ export class FlatView implements View {
   }
 
   resize(width: number, height: number, ratio: number): void {
-    for (const canvas of [this.canvas, this.background]) {
+    for (const canvas of [this.canvas, this.background, this.ghostArm]) {
       canvas.width = Math.max(Math.round(width * ratio), 1);
       canvas.height = Math.max(Math.round(height * ratio), 1);
     }
@@ -52,10 +52,13 @@ export class FlatView implements View {
 
   paint(palette: Palette): void {
     this.palette = palette;
+    const solid = { outline: palette["rp-table"], outlineWidth: 1, malletOpacity: 1 };
+    const ghost = palette["rp-ghost"];
     this.arms = [
-      { link: palette["rp-joint"], mallet: palette["rp-mallet"], outline: palette["rp-table"] },
-      { link: palette["rp-other-joint"], mallet: palette["rp-other-mallet"], outline: palette["rp-table"] },
+      { ...solid, link: palette["rp-joint"], mallet: palette["rp-mallet"] },
+      { ...solid, link: palette["rp-other-joint"], mallet: palette["rp-other-mallet"] },
     ];
+    this.ghost = { link: ghost, mallet: ghost, outline: ghost, outlineWidth: 2, malletOpacity: 0.2 };
     this.backgroundContest = null;
   }
 
@@ -69,6 +72,7 @@ export class FlatView implements View {
     context.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
 
     for (let i = 0; i < motion.arms.length; i++) drawArm(context, at, frame.arms[i], arms[i]);
+    if (frame.ghost !== null) this.drawGhost(frame.ghost, palette);
     const [from, to] = trailRange(frame);
     if (frame.layers.puck) {
       this.drawTrail(paths.puck, from, to, palette["rp-trail"]);
@@ -84,9 +88,26 @@ export class FlatView implements View {
       const [first, last] = pointsBetween(paths.commanded, from, to);
       this.drawLine(paths.commanded, first, last, palette["rp-commanded"], COMMANDED_DASHES, 1.5);
     }
-    this.drawPuck(frame, palette);
-    if (observed !== null && frame.layers.seen) this.drawSeenPuck(frame, palette);
+    drawPuck(context, at, frame, palette, "solid");
+    if (observed !== null && frame.layers.seen) drawSeenPuck(context, at, frame, palette);
     return 0;
+  }
+
+  /** Draws another replay in outlines, below the puck and the mallets of this one. */
+  private drawGhost(frame: FrameState, palette: Palette): void {
+    const { context, projection: at, ghost } = this;
+    const arm = this.ghostArm.getContext("2d");
+    if (ghost === null || arm === null) return;
+    arm.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
+    arm.clearRect(0, 0, at.width, at.height);
+    drawArmOutline(arm, at, frame.arms[0], ghost);
+    context.drawImage(this.ghostArm, 0, 0, at.width, at.height);
+    const { paths } = frame.part;
+    const [from, to] = trailRange(frame);
+    if (frame.layers.puck) this.drawTrail(paths.puck, from, to, palette["rp-ghost"]);
+    if (frame.layers.mallet) this.drawTrail(paths.mallets[0], from, to, palette["rp-ghost"]);
+    drawMallet(context, at, frame.arms[0], ghost);
+    drawPuck(context, at, frame, palette, "ghost");
   }
 
   private drawBackground(palette: Palette, contest: Contest): void {
@@ -156,51 +177,6 @@ export class FlatView implements View {
       context.moveTo(x + 3, y);
       context.arc(x, y, 3, 0, 2 * Math.PI);
     }
-    context.stroke();
-  }
-
-  private drawPuck(frame: FrameState, palette: Palette): void {
-    const { context, projection: at } = this;
-    const { x, y, yaw } = frame.pose;
-    const radius = at.length(MODEL.puck.radius_m);
-    context.fillStyle = palette["rp-puck"];
-    // A halo makes the puck visible in small pictures.
-    context.globalAlpha = HALO.opacity;
-    context.beginPath();
-    context.arc(at.x(x), at.y(y), Math.max(radius * HALO.size, HALO.leastRadius), 0, 2 * Math.PI);
-    context.fill();
-    context.globalAlpha = 1;
-    context.beginPath();
-    context.arc(at.x(x), at.y(y), radius, 0, 2 * Math.PI);
-    context.fill();
-    // The line shows the orientation.
-    context.strokeStyle = palette["rp-table"];
-    context.lineWidth = Math.max(radius * 0.18, 1);
-    context.beginPath();
-    context.moveTo(at.x(x), at.y(y));
-    context.lineTo(at.x(x) + radius * 0.85 * Math.cos(yaw), at.y(y) - radius * 0.85 * Math.sin(yaw));
-    context.stroke();
-  }
-
-  private drawSeenPuck(frame: FrameState, palette: Palette): void {
-    if (Number.isNaN(frame.seenX)) return;
-    const { context, projection: at } = this;
-    const x = at.x(frame.seenX);
-    const y = at.y(frame.seenY);
-    const radius = at.length(MODEL.puck.radius_m);
-    context.strokeStyle = palette["rp-seen"];
-    context.lineWidth = 2;
-    context.setLineDash(SEEN_DASHES);
-    context.beginPath();
-    context.arc(x, y, radius, 0, 2 * Math.PI);
-    context.stroke();
-    context.setLineDash(SOLID);
-    if (!frame.isPuckLost) return;
-    context.beginPath();
-    context.moveTo(x - radius, y - radius);
-    context.lineTo(x + radius, y + radius);
-    context.moveTo(x - radius, y + radius);
-    context.lineTo(x + radius, y - radius);
     context.stroke();
   }
 }

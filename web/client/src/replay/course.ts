@@ -1,7 +1,7 @@
 // The course of a whole game: its rally ends and violations, which the page knows before any part of the recording is loaded.
 
 import type { ConstraintGroup, RallyEnd } from "../clip/motion";
-import { CONSTRAINT_NAMES, rallyEvent, type EventFilter, type ReplayEvent, type SideNames } from "./events";
+import { CONSTRAINT_NAMES, rallyEvents, type EventFilter, type ReplayEvent, type SideNames } from "./events";
 import type { SwitchedKind } from "./fragment";
 
 /** Some violations of a side in a range of steps, inclusive. */
@@ -63,9 +63,7 @@ export function courseEvents(course: Course, names: SideNames): ReplayEvent[] {
       side: range.side,
     };
   });
-  return [...course.ends.map((end) => rallyEvent(end, names)), ...violations].sort(
-    (a, b) => a.position - b.position,
-  );
+  return [...rallyEvents(course.ends, names, [0, 0]), ...violations].sort((a, b) => a.position - b.position);
 }
 
 /** Does a course have all kinds of events that are shown? */

@@ -84,7 +84,7 @@ export function eventsOf(motion: Motion, observed: Observed | null, names: SideN
     const side = isGame ? violation.side : null;
     add("violation", violation.from, violation.to, prefix + violationText(violation), side);
   }
-  for (const end of motion.breaks) events.push(rallyEvent(end, names));
+  events.push(...rallyEvents(motion.breaks, names, motion.score ?? (motion.first === 0 ? [0, 0] : null)));
   for (const lost of observed?.lost ?? []) {
     add("lost", lost.from, lost.to, `camera lost the puck for ${lost.to - lost.from + 1} steps`);
   }
@@ -103,12 +103,20 @@ export function eventsOf(motion: Motion, observed: Observed | null, names: SideN
   return events.sort((a, b) => a.position - b.position);
 }
 
-/** The end of a rally as an event. */
-export function rallyEvent(end: RallyEnd, names: SideNames): ReplayEvent {
-  const { what, by, sample, score } = end;
-  const kind = what === "goal" || what === "foul" ? what : "rally";
-  const text = rallyText(what, by, score, names);
-  return { kind, position: sample, endPosition: sample, text, symbol: SYMBOLS[kind], side: by };
+/** The ends of rallies in a row as events. `start`: the score before the first of them; null if it is not known. */
+export function rallyEvents(
+  ends: readonly RallyEnd[],
+  names: SideNames,
+  start: readonly [number, number] | null,
+): ReplayEvent[] {
+  let before = start;
+  return ends.map((end) => {
+    const { what, sample, by } = end;
+    const kind = what === "goal" || what === "foul" ? what : "rally";
+    const text = rallyText(end, names, before);
+    before = end.score ?? before;
+    return { kind, position: sample, endPosition: sample, text, symbol: SYMBOLS[kind], side: by };
+  });
 }
 
 /** How the episode or game ended. */
@@ -138,21 +146,32 @@ function violationText(violation: Violation): string {
 }
 
 function rallyText(
-  what: string,
-  by: 0 | 1 | null,
-  score: readonly [number, number] | null,
+  { what, by, score }: RallyEnd,
   names: SideNames,
+  before: readonly [number, number] | null,
 ): string {
   const side = by === null ? "" : ` by ${names[by]}`;
   const texts: Record<string, string> = {
     goal: `goal${side}`,
-    foul: `foul${side}`,
+    foul: `foul${side}: the puck stayed too long on its side${foulPoint(by, score, before, names)}`,
     stuck: "puck stuck in the middle",
     left_table: "puck left the table",
     diverged: `simulation diverged${side}`,
   };
   const shownScore = score === null ? "" : `, ${score[0]} : ${score[1]}`;
   return (texts[what] ?? what.replaceAll("_", " ") + side) + shownScore;
+}
+
+/** Why a foul changes the score, if it does. */
+function foulPoint(
+  by: 0 | 1 | null,
+  score: readonly [number, number] | null,
+  before: readonly [number, number] | null,
+  names: SideNames,
+): string {
+  if (by === null || score === null || before === null) return "";
+  const opponent = by === 0 ? 1 : 0;
+  return score[opponent] > before[opponent] ? `; every third foul is a point for ${names[opponent]}` : "";
 }
 
 /** Merges consecutive numbers into ranges, first and last number inclusive. */

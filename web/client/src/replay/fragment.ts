@@ -25,6 +25,8 @@ export interface LinkTarget {
   readonly step?: number;
   readonly camera?: Camera | CameraPosition;
   readonly flat?: boolean;
+  /** Is the second of two replays drawn on the table of the first? */
+  readonly ghost?: boolean;
   readonly speed?: number;
   readonly layers?: Layers;
   /** The arm whose values are shown. */
@@ -43,12 +45,14 @@ export function parseFragment(fragment: string): LinkTarget {
   const speed = SPEEDS.find((value) => value === parseNumber(fields.get("speed")));
   const flat = fields.get("flat");
   const arm = fields.get("arm");
+  const ghost = fields.get("ghost");
   const layers = parseLayers(fields.get("paths"), fields.get("trail"));
   const hidden = parseNames(fields.get("hide"), EVENT_KINDS);
   return {
     ...(step !== null && step >= 0 ? { step } : {}),
     ...(camera === null ? {} : { camera }),
     ...(flat === "0" || flat === "1" ? { flat: flat === "1" } : {}),
+    ...(ghost === "0" || ghost === "1" ? { ghost: ghost === "1" } : {}),
     ...(speed === undefined ? {} : { speed }),
     ...(layers === null ? {} : { layers }),
     ...(arm === "1" || arm === "2" ? { arm: arm === "1" ? 0 : 1 } : {}),
@@ -57,7 +61,7 @@ export function parseFragment(fragment: string): LinkTarget {
 }
 
 export function writeFragment(target: LinkTarget & { readonly step: number }): string {
-  const { step, camera, flat, speed, layers, arm, hiddenKinds } = target;
+  const { step, camera, flat, ghost, speed, layers, arm, hiddenKinds } = target;
   const fields = [`t=${step}`];
   if (flat === true) fields.push("flat=1");
   if (typeof camera === "string" && flat !== true) fields.push(`cam=${camera}`);
@@ -65,6 +69,7 @@ export function writeFragment(target: LinkTarget & { readonly step: number }): s
     const { x, y, z, azimuth, elevation, distance } = camera;
     fields.push(`cam=${[x, y, z, azimuth, elevation, distance].map((value) => Number(value.toFixed(3))).join("_")}`);
   } // prettier-ignore
+  if (ghost === true) fields.push("ghost=1");
   if (speed !== undefined && speed !== 1) fields.push(`speed=${speed}`);
   if (layers !== undefined) {
     const shown = PATHS.filter((name) => layers[name]);

@@ -36,7 +36,12 @@ export interface FrameState {
   seenY: number;
   /** The camera has lost the puck. */
   isPuckLost: boolean;
+  /** Another replay that is drawn on the same table. */
+  ghost: FrameState | null;
 }
+
+/** How puck and arm are drawn: as in the replay of the table, or as those of another replay, through which the first are seen. */
+export type Look = "solid" | "ghost";
 
 /** A renderer of table, puck and arms. */
 export interface View {

@@ -4,7 +4,7 @@
 const NAMES = [
   "ground", "card", "ink", "soft", "line", "accent", "good", "fair", "poor",
   "rp-table", "rp-rim", "rp-mark", "rp-puck", "rp-arm", "rp-joint", "rp-other", "rp-other-joint",
-  "rp-mallet", "rp-other-mallet", "rp-seen", "rp-commanded", "rp-trail", "rp-backdrop", "rp-floor",
+  "rp-mallet", "rp-other-mallet", "rp-ghost", "rp-seen", "rp-commanded", "rp-trail", "rp-backdrop", "rp-floor",
   "rp-1", "rp-2", "rp-3", "rp-4", "rp-5", "rp-6", "rp-7",
 ] as const; // prettier-ignore
 

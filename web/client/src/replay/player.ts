@@ -1,25 +1,24 @@
 // The player: the controls of one replay, or of several that share a clock.
 
 import { Cameras } from "../controls/cameras";
-import { saveFile } from "../controls/data";
 import { button, h } from "../controls/dom";
 import { EventKinds } from "../controls/event-kinds";
 import { stepText, timeText, type TimeFormat } from "../controls/format";
 import { helpDialog } from "../controls/help";
 import { listenForKeys } from "../controls/keys";
 import { LayerChoice } from "../controls/layers";
+import { OneTable, type LegendEntry } from "../controls/one-table";
 import { fullScreenButton, ShareRow } from "../controls/share";
 import { Timeline } from "../controls/timeline";
 import { Transport } from "../controls/transport";
-import { captionedSize, drawCaptioned } from "./caption";
 import type { Clock } from "./clock";
 import { parseCourse } from "./course";
 import type { EventFilter, ReplayEvent, SideNames } from "./events";
 import { parseFragment, writeFragment, type Camera, type LinkTarget } from "./fragment";
 import type { Layers } from "./frame-state";
 import type { FrameLoop } from "./loop";
-import type { Palette } from "./palette";
-import { canRecord, MAX_VIDEO_WIDTH, VideoRecording } from "./recorder";
+import { canRecord } from "./recorder";
+import { Saver } from "./saver";
 import { errorText, Source, type ReplayPart } from "./source";
 import { Viewer } from "./viewer";
 
@@ -29,12 +28,6 @@ export interface PlayerOptions {
   readonly clock: Clock;
   readonly loop: FrameLoop;
   readonly prefersReducedMotion: boolean;
-}
-
-/** A recording that is running, with the colours at its start. */
-interface RunningRecording {
-  readonly video: VideoRecording;
-  readonly palette: Palette;
 }
 
 /** Replays that share a clock, with one set of controls. */
@@ -55,13 +48,15 @@ export class Player {
   private readonly layerChoice: LayerChoice;
   private readonly kinds: EventKinds;
   private readonly share: ShareRow;
+  private readonly saver: Saver;
+  /** Two replays can be shown on one table. */
+  private readonly oneTable: OneTable | null;
   private readonly controls: HTMLElement;
   private readonly viewPanel: HTMLElement;
   private readonly viewButton: HTMLButtonElement;
   private isUpdateRequested = false;
   private wasPlaying = false;
   private shownEvents: readonly ReplayEvent[] | null = null;
-  private recording: RunningRecording | null = null;
   private isLinkFollowed = false;
 
   constructor(private readonly options: PlayerOptions) {
@@ -98,13 +93,29 @@ export class Player {
     }); // prettier-ignore
     this.share = new ShareRow({
       link: () => location.href.replace(/#.*$/, "") + this.fragment(),
-      save: () => { this.savePictures(); },
-      record: canRecord() && sections.length === 1 ? () => { this.toggleRecording(); } : null,
+      save: () => {
+        for (const viewer of this.drawnViewers) this.saver.savePicture(viewer);
+      },
+      record: canRecord() && sections.length === 1 ? () => { this.saver.toggleRecording(this.viewers[0]); } : null,
       help: () => { help.showModal(); },
       announce: this.announce,
     }); // prettier-ignore
+    this.saver = new Saver({
+      clock,
+      step: () => this.step,
+      announce: this.announce,
+      failed: (reason) => { this.share.showProblem(reason); },
+      recordingChanged: (isRecording) => { this.share.showRecording(isRecording); },
+    }); // prettier-ignore
+    this.oneTable = sections.length === 2 ? this.oneTableOf(sections[0], sections[1]) : null;
     this.controls = h("div", { class: "controls" }, this.timeline.element, this.transport.element);
-    this.viewPanel = h("div", { class: "view-panel" }, this.cameras.element, this.layerChoice.element);
+    this.viewPanel = h(
+      "div",
+      { class: "view-panel" },
+      this.oneTable?.row ?? null,
+      this.cameras.element,
+      this.layerChoice.element,
+    );
     this.viewers = sections.map((section) => this.viewerOf(section, isGame));
     this.mount(help);
     listenForKeys((element) => this.contains(element), {
@@ -124,6 +135,7 @@ export class Player {
     const target = parseFragment(location.hash);
     const opened = await Promise.all(viewers.map((viewer) => viewer.open(target.step ?? 0)));
     if (!opened.some(Boolean)) return;
+    this.oneTable?.enable(this.viewers.every((viewer) => viewer.drawnFrame !== null));
     this.invalidate();
     // The others may have been moved since then when one of several replays is opened again.
     if (this.isLinkFollowed) return;
@@ -198,7 +210,9 @@ export class Player {
     panel.append(this.kinds.element, help, this.statusLine);
     const together = section.closest(".together");
     together?.append(panel);
-    together?.after(pairs);
+    // At the end: what is already shown keeps its place.
+    together?.parentElement?.append(pairs);
+    if (this.oneTable !== null) first.screen.prepend(this.oneTable.legend);
   }
 
   private get fullScreenElement(): HTMLElement {
@@ -231,6 +245,32 @@ export class Player {
     return this.viewers[0].picture.isFlat;
   }
 
+  private oneTableOf(...sections: [HTMLElement, HTMLElement]): OneTable {
+    const entryOf = ({ dataset }: HTMLElement): LegendEntry => ({
+      title: dataset.title ?? "",
+      outcome: dataset.outcome ?? "",
+    });
+    return new OneTable([entryOf(sections[0]), entryOf(sections[1])], (isOn) => {
+      this.showOnOneTable(isOn);
+      this.announce(isOn ? "Both replays on one table" : "Two tables");
+    });
+  }
+
+  /** Draws the second replay on the table of the first, or each on its own. */
+  private showOnOneTable(isOn: boolean): void {
+    const [first, second] = this.viewers;
+    first.ghost = isOn ? second : null;
+    second.isGhost = isOn;
+    this.oneTable?.show(isOn);
+    this.fullScreenElement.classList.toggle("one-table", isOn);
+    this.forEach((viewer) => { viewer.invalidate(); }); // prettier-ignore
+  }
+
+  /** The viewers whose pictures are shown. */
+  private get drawnViewers(): readonly Viewer[] {
+    return this.viewers.filter((viewer) => !viewer.isGhost);
+  }
+
   private setFlat(flat: boolean): void {
     this.forEach((viewer) => { viewer.picture.setFlat(flat); }); // prettier-ignore
     this.announce(this.isFlat ? "Flat view" : "3-D view");
@@ -258,9 +298,10 @@ export class Player {
   /** Shows what a link names. A link to a moment plays from there, unless the visitor prefers reduced motion. */
   private follow(target: LinkTarget): void {
     const { clock, prefersReducedMotion } = this.options;
-    const { step, camera, flat, speed, layers, arm, hiddenKinds } = target;
+    const { step, camera, flat, ghost, speed, layers, arm, hiddenKinds } = target;
     if (camera !== undefined) this.forEach((viewer) => { viewer.picture.setCamera(camera); }); // prettier-ignore
     if (flat !== undefined) this.forEach((viewer) => { viewer.picture.setFlat(flat); }); // prettier-ignore
+    if (ghost !== undefined && this.oneTable?.isPossible === true) this.showOnOneTable(ghost);
     if (speed !== undefined) clock.setSpeed(speed);
     if (layers !== undefined) this.layerChoice.set(layers);
     if (arm !== undefined) this.forEach((viewer) => { viewer.strips.setArm(arm); }); // prettier-ignore
@@ -279,6 +320,7 @@ export class Player {
       step: this.step,
       ...(camera === null ? {} : { camera }),
       flat: this.isFlat,
+      ghost: this.oneTable?.isOn === true,
       speed: this.options.clock.speed,
       layers: this.layers,
       arm: first.strips.arm,
@@ -357,8 +399,8 @@ export class Player {
     const { picture } = viewer;
     const camera = picture.view3d?.orbit.camera ?? null;
     this.cameras.update(picture.isFlat, camera, picture.unavailable === null);
-    if (this.recording !== null)
-      drawCaptioned(this.recording.video.context, picture.canvas, viewer.caption(), this.recording.palette);
+    this.oneTable?.showLook(picture.isFlat);
+    this.saver.addFrame(viewer);
   }
 
   /** Announces start and end of playback to screen readers; never changes of each frame. */
@@ -366,8 +408,8 @@ export class Player {
     const { clock } = this.options;
     if (clock.playing === this.wasPlaying) return;
     this.wasPlaying = clock.playing;
-    if (!clock.playing && step >= clock.last && this.recording !== null) this.toggleRecording();
     const [first] = this.viewers;
+    if (!clock.playing && step >= clock.last) this.saver.endRecording(first);
     if (clock.playing) this.announce("Playing");
     else if (step >= clock.last) this.announce(first.motionEnd || "End");
     else this.announce(`Paused at ${[stepText(step, clock.last, this.format), first.scoreTextAt(step)].filter(Boolean).join(", ")}`); // prettier-ignore
@@ -380,71 +422,5 @@ export class Player {
   private togglePanel(): void {
     const isOpen = this.viewPanel.classList.toggle("open");
     this.viewButton.setAttribute("aria-expanded", String(isOpen));
-  }
-
-  private fileName(viewer: Viewer, extension: string): string {
-    const { title } = viewer;
-    const slug = title.toLowerCase().replaceAll(/[^a-z0-9]+/g, "-").replaceAll(/^-|-$/g, ""); // prettier-ignore
-    return `${slug || "replay"}-step-${this.step}.${extension}`;
-  }
-
-  /** Saves a picture of each replay. */
-  private savePictures(): void {
-    for (const viewer of this.viewers) {
-      const frame = viewer.drawnFrame;
-      if (frame === null) continue;
-      const canvas = document.createElement("canvas");
-      viewer.picture.drawForSaving(frame, (drawing) => {
-        Object.assign(canvas, captionedSize(drawing.width, drawing.height));
-        const context = canvas.getContext("2d");
-        if (context !== null) drawCaptioned(context, drawing, viewer.caption(), viewer.palette);
-      });
-      canvas.toBlob((picture) => {
-        if (picture === null) this.announce("The picture could not be saved");
-        else saveFile(picture, this.fileName(viewer, "png"));
-      }, "image/png");
-    }
-  }
-
-  /** Starts a video at the current moment, or ends it and saves it. */
-  private toggleRecording(): void {
-    const { clock } = this.options;
-    if (this.recording !== null) {
-      const { video } = this.recording;
-      this.showNoRecording();
-      clock.pause();
-      video.stop();
-      return;
-    }
-    const { canvas } = this.viewers[0].picture;
-    const width = Math.min(canvas.width, MAX_VIDEO_WIDTH);
-    const size = captionedSize(width, (canvas.height / canvas.width) * width);
-    const failed = (): void => { this.announce("The video could not be recorded."); }; // prettier-ignore
-    let video: VideoRecording;
-    try {
-      video = new VideoRecording(size);
-    } catch {
-      failed();
-      return;
-    }
-    this.recording = { video, palette: this.viewers[0].palette };
-    this.share.showRecording(true);
-    video.file
-      .finally(() => {
-        // The browser has ended it, not the visitor.
-        if (this.recording?.video === video) this.showNoRecording();
-      })
-      .then((file) => {
-        saveFile(file, this.fileName(this.viewers[0], "webm"));
-        this.announce("Video saved");
-      })
-      .catch(failed);
-    this.announce("Recording");
-    clock.play();
-  }
-
-  private showNoRecording(): void {
-    this.recording = null;
-    this.share.showRecording(false);
   }
 }

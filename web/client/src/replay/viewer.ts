@@ -75,6 +75,10 @@ export class Viewer {
   readonly strips: StripCharts;
   /** Last step of this replay. */
   last = 0;
+  /** The replay that is drawn on this one's table, too. */
+  ghost: Viewer | null = null;
+  /** The picture is hidden, because the replay is drawn on the table of another. */
+  isGhost = false;
   private readonly currentValues = h("p", { class: "current-values" });
   private readonly problem = h("div", { class: "problem", attributes: { role: "alert", hidden: "" } });
   private readonly partEvents = new Map<number, readonly ReplayEvent[]>();
@@ -205,6 +209,13 @@ export class Viewer {
     const { title, names, format, steps } = this.options;
     const time = `${timeText(this.step, format)} (step ${this.step})`;
     const score = steps === null ? null : this.scoreAt(this.step);
+    if (this.ghost !== null) {
+      const parts = [
+        { text: title, colour: "rp-mallet" },
+        { text: this.ghost.title, colour: "rp-ghost" },
+      ] as const;
+      return { parts, detail: time };
+    }
     if (steps === null || score === null) return { parts: [{ text: title }], detail: time };
     return {
       parts: [
@@ -280,6 +291,7 @@ export class Viewer {
       seenX: NaN,
       seenY: NaN,
       isPuckLost: false,
+      ghost: null,
     };
     this.frame.part = part;
     this.strips.show(part);
@@ -355,9 +367,10 @@ export class Viewer {
     }
 
     this.updatePose(frame, position, step);
+    frame.ghost = this.ghost?.stateAt(clock.position) ?? null;
     const orbit = this.picture.view3d?.orbit;
     const moving = !this.picture.isFlat && orbit?.tick(nowMs, frame.pose) === true;
-    const calls = this.picture.draw(frame);
+    const calls = this.isGhost ? 0 : this.picture.draw(frame);
     this.updateValues(frame, step, nowMs);
     this.events.drawn();
     setData(section, "step", String(step));
@@ -365,6 +378,13 @@ export class Viewer {
     section.dataset.state = "ready";
     if (moving) this.invalidate();
   };
+
+  /** The state at a position of the clock, to draw on the table of another replay; null before it is loaded. */
+  private stateAt(clockPosition: number): FrameState | null {
+    const position = Math.min(clockPosition, this.last);
+    if (this.frame !== null) this.updatePose(this.frame, position, Math.floor(position + 1e-6));
+    return this.frame;
+  }
 
   /** Clears an error after the visitor has moved to another part; the failed part is retried when needed again. */
   private clearProblem(): void {

@@ -23,7 +23,8 @@ export class StripChart {
     seek: (sample: number) => void,
   ) {
     const [low, high] = rangeOf(series);
-    const scale = `from ${fixed(low, series.digits)} to ${fixed(high, series.digits)} ${series.unit}`;
+    const [lowest, highest] = [low, high].map((value) => `${fixed(value, series.digits)} ${series.unit}`);
+    const scale = `from ${lowest} to ${highest}`;
     const limit = `limit ${fixed(series.limit, series.digits)} ${series.unit}`;
     const violations =
       series.violations.length === 0 ? "" : `; ${series.violations.length} violations recorded`;
@@ -32,16 +33,13 @@ export class StripChart {
     this.element = h(
       "div",
       { class: "strip" },
+      h("div", { class: "label" }, h("span", { class: "title" }, series.title), this.value),
+      // The canvas says the same to screen readers.
       h(
         "div",
-        { class: "label" },
-        h("span", { class: "title" }, series.title),
-        this.value,
-        h(
-          "span",
-          { class: "scale" },
-          `${fixed(low, series.digits)} … ${fixed(high, series.digits)} ${series.unit}`,
-        ),
+        { class: "scale", attributes: { "aria-hidden": "true" } },
+        h("span", {}, highest),
+        h("span", {}, lowest),
       ),
       this.field,
     );

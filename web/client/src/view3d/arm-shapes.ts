@@ -2,6 +2,7 @@
 // KUKA LBR iiwa 14. The simulation does not use them.
 
 import { MODEL } from "../model/model";
+import type { Look } from "../replay/frame-state";
 import type { Paint, Piece } from "./coloured-geometry";
 import { ball, drum, limb, turned } from "./shapes";
 
@@ -21,6 +22,8 @@ const PAINT: readonly [ArmPaint, ArmPaint] = [
   { link: "rp-other", joint: "rp-other-joint", mallet: "rp-other-mallet" },
 ];
 
+const GHOST_PAINT: ArmPaint = { link: ["rp-ghost", "white", 0.4], joint: "rp-ghost", mallet: "rp-ghost" };
+
 /** Dark parts: the foot, the column below it, and gaps between housings. */
 const DARK: Paint = ["rp-rim", "black", 0.45];
 const METAL: Paint = ["rp-rim", "white", 0.45];
@@ -33,9 +36,10 @@ const FLANGE_LENGTH_M = 0.05;
 const ROD_RADIUS_M = 0.0125;
 
 /** All pieces of an arm; `floor_z_m`: height of the floor in the table frame. */
-export function armPieces(side: 0 | 1, floorZ: number): Piece[] {
-  const paint = PAINT[side];
-  const pieces = basePieces(paint, floorZ - MODEL.bases[side].z_m);
+export function armPieces(side: 0 | 1, floorZ: number, look: Look): Piece[] {
+  const paint = look === "ghost" ? GHOST_PAINT : PAINT[side];
+  // A ghost has its base in common with the arm of the table.
+  const pieces = look === "ghost" ? [] : basePieces(paint, floorZ - MODEL.bases[side].z_m);
   for (let i = 0; i < 6; i++) pieces.push(...(i % 2 === 0 ? upright(i, paint) : across(i, paint)));
   return [...pieces, ...toolPieces(paint), ...malletPieces(paint)];
 }

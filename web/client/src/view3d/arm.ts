@@ -2,6 +2,7 @@
 
 import { Bone, Skeleton, SkinnedMesh } from "three";
 import type { Frame, Kinematics } from "../model/kinematics";
+import type { Look } from "../replay/frame-state";
 import type { Palette } from "../replay/palette";
 import { armPieces, BASE_BODY, BODY_COUNT, MALLET_BODY } from "./arm-shapes";
 import { ColouredGeometry } from "./coloured-geometry";
@@ -13,10 +14,10 @@ export class ArmModel {
   private readonly painted: ColouredGeometry;
   private readonly bodies = Array.from({ length: BODY_COUNT }, () => new Bone());
 
-  constructor(arm: Kinematics, floorZ: number) {
-    this.painted = new ColouredGeometry(armPieces(arm.side, floorZ));
-    this.mesh = new SkinnedMesh(this.painted.geometry, glossyMaterial(0.45));
-    this.mesh.castShadow = true;
+  constructor(arm: Kinematics, floorZ: number, look: Look) {
+    this.painted = new ColouredGeometry(armPieces(arm.side, floorZ, look));
+    this.mesh = new SkinnedMesh(this.painted.geometry, glossyMaterial(0.45, look));
+    this.mesh.castShadow = look === "solid";
     // Its extent would have to be computed from the bones in each frame.
     this.mesh.frustumCulled = false;
     this.mesh.matrixAutoUpdate = false;

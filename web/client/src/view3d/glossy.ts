@@ -1,6 +1,9 @@
 // The material of parts that shine.
 
 import { MeshStandardMaterial } from "three";
+import type { Look } from "../replay/frame-state";
+
+const GHOST_OPACITY = 0.55;
 
 /**
  * What shiny parts reflect: a bright ceiling with two lamps over a dim floor. It is computed per pixel; an image of the
@@ -20,8 +23,16 @@ const REFLECTION = `
   reflectedLight.indirectSpecular += share * (0.5 * ceiling + 3.2 * lamp + 1.2 * window);
 }`;
 
-export function glossyMaterial(roughness: number): MeshStandardMaterial {
+export function glossyMaterial(roughness: number, look: Look): MeshStandardMaterial {
   const material = new MeshStandardMaterial({ vertexColors: true, roughness, metalness: 0 });
+  if (look === "ghost") {
+    material.transparent = true;
+    material.opacity = GHOST_OPACITY;
+    // Behind what it coincides with, as at the start of two episodes.
+    material.polygonOffset = true;
+    material.polygonOffsetFactor = 1;
+    material.polygonOffsetUnits = 4;
+  }
   material.onBeforeCompile = (shader) => {
     shader.fragmentShader = shader.fragmentShader.replace("#include <lights_fragment_end>", REFLECTION);
   };

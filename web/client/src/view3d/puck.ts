@@ -10,8 +10,8 @@ import {
   type BufferGeometry,
 } from "three";
 import { MODEL } from "../model/model";
-import type { Palette } from "../replay/palette";
-import type { FrameState } from "../replay/frame-state";
+import type { ColourName, Palette } from "../replay/palette";
+import type { FrameState, Look } from "../replay/frame-state";
 import { ColouredGeometry } from "./coloured-geometry";
 import { glossyMaterial } from "./glossy";
 import { arc, drum, mark } from "./shapes";
@@ -25,24 +25,27 @@ const LEAST_HALO_PIXELS = 15;
 /** Below the trails, above the lines on the table. */
 const HALO_Z_M = 0.0014;
 
-/** The puck with a halo that makes it visible in small pictures, and its observed position. */
+/** The puck with a halo that makes it visible in small pictures; of a solid one also the observed position. */
 export class PuckModel {
   readonly group = new Group();
-  private readonly painted = new ColouredGeometry([
-    { geometry: drum(RADIUS, 0.0005, HEIGHT, 0.004), paint: "rp-puck" },
-    { geometry: arc(0, 0, RADIUS * 0.74, RADIUS * 0.12, HEIGHT + 0.0004, 0, 2 * Math.PI), paint: ["rp-puck", "white", 0.85] },
-    // The line shows the orientation.
-    { geometry: mark(0, 0, RADIUS * 0.68, 0, RADIUS * 0.12, HEIGHT), paint: ["rp-puck", "white", 0.85] },
-  ]); // prettier-ignore
+  private readonly painted: ColouredGeometry;
+  private readonly colour: ColourName;
   private readonly puck: Mesh;
   private readonly halo: Mesh<BufferGeometry, MeshBasicMaterial>;
   private readonly seenColour = new MeshBasicMaterial();
   private readonly seen: Mesh;
   private readonly lost: Mesh;
 
-  constructor() {
-    this.puck = new Mesh(this.painted.geometry, glossyMaterial(0.4));
-    this.puck.castShadow = true;
+  constructor(private readonly look: Look) {
+    this.colour = look === "ghost" ? "rp-ghost" : "rp-puck";
+    this.painted = new ColouredGeometry([
+      { geometry: drum(RADIUS, 0.0005, HEIGHT, 0.004), paint: this.colour },
+      { geometry: arc(0, 0, RADIUS * 0.74, RADIUS * 0.12, HEIGHT + 0.0004, 0, 2 * Math.PI), paint: [this.colour, "white", 0.85] },
+      // The line shows the orientation.
+      { geometry: mark(0, 0, RADIUS * 0.68, 0, RADIUS * 0.12, HEIGHT), paint: [this.colour, "white", 0.85] },
+    ]); // prettier-ignore
+    this.puck = new Mesh(this.painted.geometry, glossyMaterial(0.4, look));
+    this.puck.castShadow = look === "solid";
     this.halo = new Mesh(
       haloGeometry(),
       new MeshBasicMaterial({ vertexColors: true, transparent: true, depthWrite: false }),
@@ -64,7 +67,7 @@ export class PuckModel {
     this.puck.rotation.z = pose.yaw;
     this.halo.position.set(pose.x, pose.y, HALO_Z_M);
     this.halo.scale.setScalar(haloScale(metresPerPixel));
-    const seen = frame.layers.seen && !Number.isNaN(frame.seenX);
+    const seen = this.look === "solid" && frame.layers.seen && !Number.isNaN(frame.seenX);
     this.seen.visible = seen;
     this.lost.visible = seen && frame.isPuckLost;
     if (!seen) return;
@@ -75,7 +78,7 @@ export class PuckModel {
 
   paint(palette: Palette): void {
     this.painted.paint(palette);
-    this.halo.material.color.set(palette["rp-puck"]);
+    this.halo.material.color.set(palette[this.colour]);
     this.seenColour.color.set(palette["rp-seen"]);
   }
 }

@@ -7,6 +7,7 @@ import { trailRange, type FrameState, type View } from "../replay/frame-state";
 import { ArmModel } from "./arm";
 import { ContactShadows } from "./contact-shadows";
 import { fieldOf, visibleShare } from "./framing";
+import { GhostModel } from "./ghost";
 import { RenderQuality } from "./quality";
 import { Orbit } from "./orbit";
 import { followPointer } from "./pointer";
@@ -29,13 +30,14 @@ export class View3D implements View {
   private visibleShare = 1;
   private readonly camera = new PerspectiveCamera(FIELD_OF_VIEW_DEG, 1.6, 0.1, 60);
   private readonly floor = new Floor();
-  private readonly puck = new PuckModel();
+  private readonly puck = new PuckModel("solid");
   private readonly contactShadows = new ContactShadows();
   private readonly puckPath = new Ribbon(false);
   private readonly malletPaths = [new Ribbon(false), new Ribbon(false)];
   private readonly commandedPath = new Ribbon(true);
   private readonly arms: ArmModel[] = [];
   private table: TableModel | null = null;
+  private ghost: GhostModel | null = null;
   private palette: Palette | null = null;
   private readonly quality = new RenderQuality();
   private ratio = 1;
@@ -93,6 +95,7 @@ export class View3D implements View {
     this.table?.paint(palette);
     for (const arm of this.arms) arm.paint(palette);
     this.puck.paint(palette);
+    this.ghost?.paint(palette);
     this.puckPath.paint(palette["rp-trail"]);
     this.malletPaths[0].paint(palette["rp-mallet"]);
     this.malletPaths[1].paint(palette["rp-other-mallet"]);
@@ -115,6 +118,7 @@ export class View3D implements View {
       this.malletPaths[i].set(path, from, to, least);
     }
     this.commandedPath.set(frame.layers.commanded ? paths.commanded : null, from, to, least);
+    this.drawGhost(frame.ghost, metresPerPixel, least);
     this.placeCamera();
     this.renderer.info.reset();
     this.renderer.render(this.scene, this.camera);
@@ -132,6 +136,15 @@ export class View3D implements View {
     this.renderer.setPixelRatio(Math.min(this.ratio, this.quality.ratio));
   }
 
+  private drawGhost(frame: FrameState | null, metresPerPixel: number, leastTrailM: number): void {
+    if (frame !== null && this.ghost === null) {
+      this.ghost = new GhostModel(frame.arms[0]);
+      this.scene.add(this.ghost.group);
+      if (this.palette !== null) this.ghost.paint(this.palette);
+    }
+    this.ghost?.set(frame, metresPerPixel, leastTrailM);
+  }
+
   /** Adds table and arms when the content is known. */
   private addObjects(frame: FrameState, contest: Contest): void {
     const count = frame.part.motion.arms.length;
@@ -141,7 +154,7 @@ export class View3D implements View {
       this.scene.add(this.table.group);
     }
     while (this.arms.length < count) {
-      const arm = new ArmModel(frame.arms[this.arms.length], FLOOR_Z_M);
+      const arm = new ArmModel(frame.arms[this.arms.length], FLOOR_Z_M, "solid");
       this.arms.push(arm);
       this.scene.add(arm.mesh);
     }
