@@ -19,6 +19,7 @@ mod cutoff;
 mod dashboards;
 mod demo;
 mod documentation;
+mod episode_list;
 mod front_page;
 mod full_disk;
 mod game_replay;
