@@ -336,6 +336,7 @@ async fn frozen_boards_hide_stills() {
     site.post(&freeze, Some(ADMIN), &json!({ "reason": "surprise" }))
         .await
         .json(200);
+    site.next_day();
     let day = record_day_on(site, true).await;
     let episode = format!("{}/prepare/0", day.page);
     for path in [episode.clone(), format!("{episode}/still.svg")] {

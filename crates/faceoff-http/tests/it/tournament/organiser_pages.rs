@@ -152,7 +152,7 @@ async fn refused_tournament_form_keeps_what_was_typed() {
     for (changed, expected) in [
         (("teams", "Unknown"), "no team"),
         (("rounds", "many"), "expected a number"),
-        (("rounds", "0"), "rounds"),
+        (("rounds", "0"), "expected 1 to 100"),
         (("name", "?"), "name"),
     ] {
         let mut all = vec![("name", "Cup"), ("teams", "")];
