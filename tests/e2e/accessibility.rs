@@ -115,6 +115,13 @@ fn dashboards_follow_accessibility_rules() {
         all_faults.extend(check_page(&member, &server, &axe_script, path));
     }
     let organiser = sign_in(&browser, &server, InvitedUser::organiser("Grace"));
+    let cup = server.post(
+        "/api/v1/tournaments",
+        &server.admin_token,
+        &json!({ "name": "Cup", "teams": ["Alpha"] }),
+    );
+    let cup: Value = cup.json().expect("the API speaks JSON");
+    let cup = cup["id"].as_str().expect("a tournament has an id");
     let stage = evaluation["stage"]
         .as_str()
         .expect("an evaluation has a stage");
@@ -124,6 +131,9 @@ fn dashboards_follow_accessibility_rules() {
         "/organiser/teams",
         "/organiser/stages",
         &format!("/organiser/stages/{stage}"),
+        "/organiser/tournaments",
+        &format!("/organiser/tournaments/{cup}"),
+        &format!("/organiser/decide/start-round/{cup}"),
         "/organiser/messages",
         "/organiser/storage",
         "/organiser/workers",

@@ -2,7 +2,7 @@
 
 use crate::{CONFIG, Team, evaluation_path, replay::PREFERS_REDUCED_MOTION, start_day};
 use faceoff_tests::{
-    browser::{Browser, Page},
+    browser::{Browser, Page, View},
     bundle,
     server::Server,
 };
@@ -86,4 +86,32 @@ fn heads_of_the_board_explain_themselves() {
     );
     click(&page, "[popovertarget=about-points]");
     assert_eq!(page.evaluate(is_shown), false);
+}
+
+#[test]
+fn board_of_a_task_needs_no_sideways_scrolling() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let (server, _) = evaluated_striker(scratch.path());
+    let browser = Browser::start(scratch.path());
+    let page = browser.open(&format!("{}/tasks/defend", server.url));
+    // The longest name and large numbers.
+    let _ = page.evaluate(
+        "(() => {
+            const text = (selector, text) => document.querySelectorAll(selector).forEach(found => { found.textContent = text; });
+            text('.board .team > a', 'Donaudampfschifffahrtsgesellschafts Team');
+            text('.board .small', '1000');
+            text('.board .points .figure', '1000.5');
+        })()",
+    );
+    for width in [320, 600, 896, 897, 960, 1024, 1100, 1150, 1216, 1280, 1440] {
+        page.set_view(View {
+            width,
+            ..View::DESKTOP
+        });
+        let excess = page.evaluate(
+            "(board => board.scrollWidth - board.clientWidth)(document.querySelector('.board.task').parentElement)",
+        );
+        assert_eq!(excess, 0, "{width}");
+        assert_eq!(page.overflow(), 0, "{width}");
+    }
 }

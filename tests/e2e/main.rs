@@ -20,6 +20,7 @@ mod cutoff;
 mod dashboards;
 mod demo;
 mod documentation;
+mod episode_list;
 mod frame_costs;
 mod front_page;
 mod full_disk;

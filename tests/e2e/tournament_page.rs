@@ -4,6 +4,7 @@ use crate::{
     CONFIG,
     axe::{axe_script, faults},
     commands::admin,
+    dashboards::{InvitedUser, sign_in},
     tournament::{OPEN_CUP, create_teams_with_hold},
 };
 use faceoff_tests::{
@@ -102,4 +103,31 @@ fn round_pages_update_live_and_can_hide_results() {
         found.extend(faults(page, &axe, &path));
     }
     assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+#[test]
+fn organiser_opens_and_starts_a_tournament_by_forms() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let server = Server::start(&scratch.path().join("data"), CONFIG);
+    create_teams_with_hold(&server, &["Ada", "Bob"]);
+    let browser = Browser::start(scratch.path());
+    let grace = sign_in(&browser, &server, InvitedUser::organiser("Grace"));
+    grace.go_to(&format!("{}/organiser", server.url));
+    grace.navigate_by("document.querySelector('.tabs a[href=\"/organiser/tournaments\"]').click()");
+    assert_eq!(grace.text("h1"), "Tournaments");
+    let fields = [("name", "Cup"), ("teams", "Ada\nBob"), ("rounds", "1")];
+    grace.send_form("form[action='/organiser/tournaments']", &fields);
+    assert_eq!(grace.text("h1"), "Cup");
+    assert!(grace.text(".done").contains("The tournament is open"));
+    grace.navigate_by("document.querySelector('.primary-action').click()");
+    assert_eq!(grace.text("h1"), "Start round 1 of Cup");
+    grace.send_form("main form", &[]);
+    assert!(grace.text(".done").contains("The round has started"));
+    assert!(grace.text(".facts").contains("round in progress"));
+    let tournaments: Value = server
+        .get("/api/v1/tournaments", None)
+        .json()
+        .expect("the API speaks JSON");
+    assert_eq!(tournaments[0]["phase"], "round", "{tournaments}");
+    assert_eq!(grace.console_errors(), Vec::<String>::new());
 }

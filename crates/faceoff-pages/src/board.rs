@@ -148,7 +148,12 @@ pub(super) async fn overall(
     let context = Context::new(&board, previous, &course, sort.is_by_rank());
     let groups = context.groups(|row| OverallRow::new(row, &context, &board.weights, &competition));
     let front = match query == BoardPageQuery::default() {
-        true => Some(FrontPage::load(&app, &visibility, &board, &groups).await?),
+        true => {
+            let takes_registrations = season.takes_registrations;
+            let front =
+                FrontPage::load(&app, &visibility, &board, &groups, takes_registrations).await?;
+            Some(front)
+        }
         false => None,
     };
     let page = OverallPage {

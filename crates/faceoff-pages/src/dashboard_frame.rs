@@ -13,29 +13,45 @@ use serde::Deserialize;
 pub(super) struct Tab {
     pub(super) path: &'static str,
     pub(super) name: &'static str,
-    pub(super) is_current: bool,
+    /// Value of the attribute `aria-current`: the page itself, or the group that it is in; `None` for other pages.
+    pub(super) current: Option<&'static str>,
 }
 
-/// Path and name of each page of the team dashboard.
-const TEAM_TABS: [(&str, &str); 4] = [
-    ("/dashboard", "Overview"),
-    ("/dashboard/questions", "Questions"),
-    ("/dashboard/access", "Members and tokens"),
-    ("/dashboard/settings", "Settings"),
+/// A page of a dashboard: its path and name.
+type TabPage = (&'static str, &'static str);
+
+/// A tab with the pages that a second row of tabs leads to; none for a single page.
+type TabGroup = (TabPage, &'static [TabPage]);
+
+const TEAM_TABS: [TabGroup; 4] = [
+    (("/dashboard", "Overview"), &[]),
+    (("/dashboard/questions", "Questions"), &[]),
+    (("/dashboard/access", "Members and tokens"), &[]),
+    (("/dashboard/settings", "Settings"), &[]),
 ];
 
-/// Path and name of each page of the organiser dashboard.
-const ORGANISER_TABS: [(&str, &str); 10] = [
-    ("/organiser", "Overview"),
-    ("/organiser/day", "Evaluation day"),
-    ("/organiser/teams", "Teams"),
-    ("/organiser/stages", "Stages"),
-    ("/organiser/messages", "Messages"),
-    ("/organiser/storage", "Storage"),
-    ("/organiser/workers", "Workers"),
-    ("/organiser/access", "Users and tokens"),
-    ("/organiser/log", "Log"),
-    ("/organiser/settings", "Settings"),
+const ORGANISER_TABS: [TabGroup; 9] = [
+    (("/organiser", "Overview"), &[]),
+    (("/organiser/day", "Evaluation day"), &[]),
+    (("/organiser/stages", "Stages"), &[]),
+    (("/organiser/tournaments", "Tournaments"), &[]),
+    (
+        ("/organiser/teams", "People"),
+        &[
+            ("/organiser/teams", "Teams"),
+            ("/organiser/access", "Users and tokens"),
+        ],
+    ),
+    (("/organiser/messages", "Messages"), &[]),
+    (
+        ("/organiser/workers", "Site"),
+        &[
+            ("/organiser/workers", "Workers"),
+            ("/organiser/storage", "Storage"),
+        ],
+    ),
+    (("/organiser/log", "Log"), &[]),
+    (("/organiser/settings", "Settings"), &[]),
 ];
 
 /// Header of a dashboard page.
@@ -46,6 +62,8 @@ pub(super) struct DashboardHeader {
     /// Name of the signed-in user.
     pub(super) user: String,
     pub(super) tabs: Vec<Tab>,
+    /// The second row: name of the current tab, and its pages.
+    pub(super) subtabs: Option<(&'static str, Vec<Tab>)>,
     pub(super) notice: NoticeText,
 }
 
@@ -163,6 +181,24 @@ const DONE_TEXTS: &[(&str, &str)] = &[
         "password-set",
         "Password changed. Your other sessions and tokens no longer work.",
     ),
+    (
+        "tournament-opened",
+        "The tournament is open. Start its first round when all teams are ready.",
+    ),
+    ("teams-entered", "The teams take part."),
+    (
+        "round-started",
+        "The round has started; its games are queued.",
+    ),
+    (
+        "tournament-paused",
+        "The tournament is paused: no game starts.",
+    ),
+    ("tournament-resumed", "The tournament has resumed."),
+    ("tournament-closed", "The tournament is closed."),
+    ("team-left", "The team has left the tournament."),
+    ("game-voided", "Voided: the game has to be rerun."),
+    ("game-rerun", "The game is queued again."),
     ("stage-made", "The stage was created."),
     ("stage-changed", "The stage was changed."),
     ("team-changed", "The team was changed."),
@@ -172,15 +208,27 @@ const DONE_TEXTS: &[(&str, &str)] = &[
 impl DashboardHeader {
     /// `current`: path of the page.
     pub(super) fn new(caller: &Caller, current: &str, notice: Notice<'_>) -> Self {
-        let (tabs, title): (&[(&str, &str)], _) = match caller.is_organiser() {
+        let (groups, title): (&[TabGroup], _) = match caller.is_organiser() {
             true => (&ORGANISER_TABS, "Organiser dashboard"),
             false => (&TEAM_TABS, "Team dashboard"),
         };
-        let tab = |(path, name): &(&'static str, &'static str)| Tab {
+        let is_shown = |(path, _): &TabPage| *path == current;
+        let tab = |(path, name): &TabPage| Tab {
             path,
             name,
-            is_current: *path == current,
+            current: (*path == current).then_some("page"),
         };
+        let tabs = groups.iter().map(|(first, pages)| Tab {
+            current: match pages.iter().any(is_shown) {
+                true => Some("true"),
+                false => tab(first).current,
+            },
+            ..tab(first)
+        });
+        let subtabs = groups.iter().find_map(|((_, name), pages)| {
+            let is_current = pages.iter().any(is_shown);
+            is_current.then(|| (*name, pages.iter().map(tab).collect()))
+        });
         Self {
             style: assets::DASHBOARD_STYLE.url(),
             script: assets::DASHBOARD_SCRIPT.url(),
@@ -192,7 +240,8 @@ impl DashboardHeader {
                 },
                 |user| user.name.to_string(),
             ),
-            tabs: tabs.iter().map(tab).collect(),
+            tabs: tabs.collect(),
+            subtabs,
             notice: NoticeText::from(notice),
         }
     }

@@ -3,6 +3,7 @@
 
 mod maps;
 mod rows;
+pub(super) mod still;
 
 use super::{
     assets,
@@ -119,11 +120,12 @@ pub(super) async fn page(
     let page = usize::try_from(query.page.unwrap_or(1)).unwrap_or(usize::MAX);
     let page = page.clamp(1, pages);
     let first = (page - 1) * ROWS_PER_PAGE;
+    let still_version = still::version(&clips.file);
     let rows: Vec<Row> = matching
         .iter()
         .skip(first)
         .take(ROWS_PER_PAGE)
-        .map(|line| Row::new(competition, id, line))
+        .map(|line| Row::new(competition, id, line, &still_version))
         .collect();
     let other_page = |number: usize| {
         let query = EpisodesQuery {

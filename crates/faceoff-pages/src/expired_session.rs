@@ -1,18 +1,24 @@
-//! Forms of the dashboards that are sent after the session has expired: the sign-in page keeps what was typed.
+//! Forms of the dashboards that are sent after the session has expired, or that fail by a fault of the server: a page keeps what was typed.
 
 use crate::{
-    kept_form::KeptForm,
+    frame::{PageProblem, ServerFault},
+    kept_form::{self, KeptForm},
     page_auth::{form_path, redirect_to_sign_in},
     sign_in,
-    signed_in::SignedIn,
+    signed_in::is_visitor,
 };
 use axum::{
+    body::Body,
     extract::{FromRequest, RawForm, Request, State},
     http::{HeaderMap, StatusCode, header},
     middleware::Next,
     response::{IntoResponse, Response},
 };
-use faceoff_service::{app::App, session};
+use faceoff_service::{
+    app::App,
+    problem::{Problem, ProblemKind},
+    session,
+};
 
 fn is_text_form(headers: &HeaderMap) -> bool {
     let media_type = headers.get(header::CONTENT_TYPE);
@@ -20,29 +26,46 @@ fn is_text_form(headers: &HeaderMap) -> bool {
     media_type.is_some_and(|value| value.starts_with("application/x-www-form-urlencoded"))
 }
 
-/// Answers a dashboard's form without a valid session with the sign-in page, which keeps the form. Forms of other sites are not kept, and
-/// neither are files.
+/// Answers a dashboard's form without a valid session with the sign-in page, and a form that failed by a fault of the server with a page of
+/// that problem. Both keep the form. Forms of other sites are not kept, and neither are files.
 pub(super) async fn keep_form(State(app): State<App>, request: Request, next: Next) -> Response {
     let headers = request.headers();
     let path = form_path(request.uri().path()).map(str::to_owned);
     let is_keepable = !request.method().is_safe()
-        && !SignedIn::is_current()
         && !headers.contains_key(header::AUTHORIZATION)
         && is_text_form(headers)
         && session::check_same_origin(headers).is_ok();
     let Some(path) = path.filter(|_| is_keepable) else {
         return next.run(request).await;
     };
+    let (parts, body) = request.into_parts();
+    let request = Request::from_parts(parts.clone(), body);
     let body = match RawForm::from_request(request, &()).await {
         Ok(RawForm(body)) => body,
-        Err(rejection) => return rejection.into_response(),
+        Err(rejection) => {
+            let detail = format!("the form is malformed: {}", rejection.body_text());
+            let problem = Problem::new(ProblemKind::InvalidRequest, detail);
+            return PageProblem::from(problem).into_response();
+        }
     };
-    let fields = serde_urlencoded::from_bytes(&body).unwrap_or_default();
-    match KeptForm::new(&path, fields) {
-        Some(form) => match sign_in::page_with_form(&app, form).await {
-            Ok(page) => (StatusCode::UNAUTHORIZED, page).into_response(),
-            Err(problem) => problem.into_response(),
-        },
-        None => redirect_to_sign_in(&path),
+    let form = || {
+        let fields = serde_urlencoded::from_bytes(&body).unwrap_or_default();
+        KeptForm::new(&path, fields)
+    };
+    if is_visitor() {
+        return match form() {
+            Some(form) => match sign_in::page_with_form(&app, form).await {
+                Ok(page) => (StatusCode::UNAUTHORIZED, page).into_response(),
+                Err(problem) => problem.into_response(),
+            },
+            None => redirect_to_sign_in(&path),
+        };
+    }
+    let request = Request::from_parts(parts, Body::from(body.clone()));
+    let response = next.run(request).await;
+    let problem = response.extensions().get::<ServerFault>().cloned();
+    match problem.zip(form()) {
+        Some((fault, form)) => kept_form::page_after_fault(&app, form, fault, response),
+        None => response,
     }
 }

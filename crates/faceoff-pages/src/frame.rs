@@ -154,6 +154,13 @@ pub(super) fn render(page: &impl Template) -> Result<Response, PageProblem> {
     }
 }
 
+/// Response extension: a fault of the server, which the page shows.
+#[derive(Debug, Clone)]
+pub(super) struct ServerFault {
+    pub(super) title: &'static str,
+    pub(super) detail: String,
+}
+
 /// A problem, shown as a page.
 pub(super) struct PageProblem(pub(super) Problem);
 
@@ -187,6 +194,12 @@ impl IntoResponse for PageProblem {
                 response
                     .headers_mut()
                     .extend(self.0.headers().iter().cloned());
+                if kind.status().is_server_error() {
+                    response.extensions_mut().insert(ServerFault {
+                        title: kind.title(),
+                        detail: self.0.detail().to_owned(),
+                    });
+                }
                 response
             }
             Err(error) => Problem::internal(error).into_response(),

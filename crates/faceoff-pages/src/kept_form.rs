@@ -1,13 +1,15 @@
 //! A form that was submitted after the session had expired. What was typed is kept in the page on which the user signs in, and shown
-//! once more afterwards, to be sent. It is kept in the pages only, never on the server or in an address, and secrets are not kept.
+//! once more afterwards, to be sent. A form that failed by a fault of the server is shown once more with the problem. It is kept in the
+//! pages only, never on the server or in an address, and secrets are not kept.
 
 use crate::{
-    frame::{Frame, PageProblem, render},
+    frame::{Frame, PageProblem, ServerFault, render},
     page_auth::form_path,
 };
 use askama::Template;
-use axum::response::Response;
+use axum::response::{Html, IntoResponse, Response};
 use faceoff_service::app::App;
+use uuid::Uuid;
 
 /// A form with what was typed.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -40,6 +42,12 @@ impl KeptField {
         let mut letters = words.chars();
         let first = letters.next().into_iter().flat_map(char::to_uppercase);
         first.chain(letters).collect()
+    }
+
+    /// Was it a hidden field? Ids, versions and the invitation of a user who returns are not typed.
+    pub(super) fn is_hidden(&self) -> bool {
+        let is_return = self.name == "role" && self.value == "return";
+        is_return || self.name == "version" || self.value.parse::<Uuid>().is_ok()
     }
 
     /// Is it a ticked checkbox?
@@ -93,6 +101,8 @@ impl KeptForm {
 struct Page {
     frame: Frame,
     form: KeptForm,
+    /// Why the form was not processed; `None`: the session had expired.
+    fault: Option<ServerFault>,
 }
 
 /// The page from which a user who has signed in sends the form.
@@ -100,7 +110,27 @@ pub(super) async fn page(app: &App, form: KeptForm) -> Result<Response, PageProb
     render(&Page {
         frame: Frame::load(app, "").await?,
         form,
+        fault: None,
     })
+}
+
+/// The page of a fault of the server, from which the user can send the form again. It has the status of `response`, which
+/// showed the fault alone. Nothing of it is read from the database, which may be what failed.
+pub(super) fn page_after_fault(
+    app: &App,
+    form: KeptForm,
+    fault: ServerFault,
+    response: Response,
+) -> Response {
+    let page = Page {
+        frame: Frame::for_app(app, String::new(), ""),
+        form,
+        fault: Some(fault),
+    };
+    match page.render() {
+        Ok(html) => (response.status(), Html(html)).into_response(),
+        Err(_) => response,
+    }
 }
 
 #[cfg(test)]
@@ -127,6 +157,26 @@ mod tests {
         let names: Vec<&str> = form.fields.iter().map(|field| &*field.name).collect();
         assert_eq!(names, ["text", "empty"]);
         assert_eq!(KeptForm::new("/dashboard", pairs(&typed[1..])), None);
+    }
+
+    #[test]
+    fn ids_and_versions_are_not_typed() {
+        let field = |(name, value): (&str, &str)| KeptField {
+            name: name.to_owned(),
+            value: value.to_owned(),
+        };
+        let id = "6b1f0a1e-6f0b-4d3a-9b57-0d8f2f3f7a11";
+        for hidden in [
+            ("person", id),
+            ("stage", id),
+            ("version", "2"),
+            ("role", "return"),
+        ] {
+            assert!(field(hidden).is_hidden(), "{hidden:?}");
+        }
+        for shown in [("role", "member"), ("stage", "Qualifying"), ("text", "")] {
+            assert!(!field(shown).is_hidden(), "{shown:?}");
+        }
     }
 
     #[test]

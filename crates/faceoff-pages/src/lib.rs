@@ -106,6 +106,10 @@ pub fn router(app: &App, time_limit: Duration, api: Arc<Value>) -> Router<App> {
             "/evaluations/{id}/episodes/{task}/{episode}/embed",
             get(replay::embedded),
         )
+        .route(
+            "/evaluations/{id}/episodes/{task}/{episode}/still.svg",
+            get(episodes::still::picture),
+        )
         .route("/games/{id}", get(game::page))
         .route("/games/{id}/embed", get(game::embedded))
         .route("/tournaments", get(tournaments::page))

@@ -12,6 +12,9 @@ mod stage_form;
 mod stages;
 mod storage;
 mod teams;
+mod tournament;
+mod tournament_form;
+mod tournaments;
 mod workers;
 
 use super::dashboard::{access, settings};
@@ -34,6 +37,12 @@ pub(super) fn router() -> Router<App> {
             "/organiser/stages/{id}",
             get(stage::page).post(stage::change),
         )
+        .route(
+            tournaments::PATH,
+            get(tournaments::page).post(tournaments::open),
+        )
+        .route("/organiser/tournaments/{id}", get(tournament::page))
+        .route("/organiser/tournaments/{id}/teams", post(tournament::enter))
         .route(
             "/organiser/messages",
             get(messages::page).post(messages::announce),

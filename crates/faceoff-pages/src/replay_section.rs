@@ -3,7 +3,7 @@
 
 use super::{
     episode_text::plain_end,
-    table_drawing::{self, Dot, TableOutline},
+    table_drawing::{self, Dot, Position, TableOutline},
 };
 use faceoff_replay::{
     Clip,
@@ -74,7 +74,23 @@ pub(super) struct Still {
     pub(super) mallet_radius: f64,
 }
 
+/// Least distance between two points of a path in a small picture, m: about half a pixel.
+const SMALL_PICTURE_STEP_M: f64 = 0.008;
+
 impl Still {
+    /// The motion in a picture of about a hundred pixels, with fewer points.
+    pub(super) fn small(motion: &Clip) -> Self {
+        let thin = |positions: &[Position]| {
+            table_drawing::path(&table_drawing::thinned(positions, SMALL_PICTURE_STEP_M))
+        };
+        Self {
+            puck_path: thin(&motion.puck_positions()),
+            mallet_path: thin(&motion.mallet_positions(0)),
+            opponent_path: thin(&motion.mallet_positions(1)),
+            ..Self::new(motion, None)
+        }
+    }
+
     pub(super) fn new(motion: &Clip, observed: Option<&Clip>) -> Self {
         let [puck, mallet] = [motion.puck_positions(), motion.mallet_positions(0)];
         let contacts = motion.header.contacts.iter();

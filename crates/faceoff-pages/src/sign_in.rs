@@ -4,6 +4,7 @@ use super::{
     frame::{Frame, PageProblem, render},
     kept_form::{self, KeptForm},
     page_auth::return_path,
+    signed_in::with_user,
 };
 use askama::Template;
 use axum::{
@@ -13,7 +14,7 @@ use axum::{
 };
 use faceoff_service::{
     app::App,
-    auth::Caller,
+    auth::{self, Caller},
     extract::PageForm,
     network::ClientNetwork,
     problem::ProblemKind,
@@ -117,7 +118,9 @@ pub(super) async fn submit(
     match signed_in {
         Ok((_, secret)) if let Some(kept) = form.kept => {
             let cookie = session::set_cookie(&app.config, Some(secret.as_str()))?;
-            let page = kept_form::page(&app, kept).await?;
+            let caller = auth::caller_with_session(&app, secret.as_str()).await?;
+            let page = kept_form::page(&app, kept);
+            let page = with_user(&app, caller.as_ref(), page).await?;
             Ok((AppendHeaders([(header::SET_COOKIE, cookie)]), page).into_response())
         }
         Ok((_, secret)) => {

@@ -7,12 +7,23 @@ use axum::{
     response::Response,
 };
 use faceoff_api::paths::API_BASE;
-use faceoff_service::{app::App, auth, views::pending_decisions};
+use faceoff_service::{
+    app::App,
+    auth::{self, Caller, SessionCaller},
+    views::pending_decisions,
+};
 
 tokio::task_local! {
-    /// The user whose request the current task handles. Every page shows it, error pages included, so it is not passed through all of
+    /// Whose request the current task handles. Every page shows the user, error pages included, so it is not passed through all of
     /// their functions.
-    static SIGNED_IN: SignedIn;
+    static SENDER: Sender;
+}
+
+/// Who has sent a request for a page.
+enum Sender {
+    User(SignedIn),
+    /// The database could not be read.
+    Unknown,
 }
 
 /// The signed-in user, as the navigation shows them.
@@ -28,12 +39,48 @@ pub(super) struct SignedIn {
 impl SignedIn {
     /// The user of the current request; `None` for visitors.
     pub(super) fn current() -> Option<Self> {
-        SIGNED_IN.try_with(Clone::clone).ok()
+        let user = SENDER.try_with(|sender| match sender {
+            Sender::User(user) => Some(user.clone()),
+            Sender::Unknown => None,
+        });
+        user.ok().flatten()
     }
 
-    /// Is there a user, without the name?
-    pub(super) fn is_current() -> bool {
-        SIGNED_IN.try_with(|_| ()).is_ok()
+    /// `None` for API clients of teams and for the host, who have no name.
+    async fn new(app: &App, caller: &Caller) -> Option<Self> {
+        let is_organiser = caller.is_organiser();
+        Some(Self {
+            name: caller.user()?.name.to_string(),
+            dashboard: match is_organiser {
+                true => "/organiser",
+                false => "/dashboard",
+            },
+            pending_decisions: match is_organiser {
+                true => pending_decisions::count(app).await.unwrap_or_default(),
+                false => 0,
+            },
+        })
+    }
+}
+
+/// Has a visitor sent the current request? False if that is not known.
+pub(super) fn is_visitor() -> bool {
+    SENDER.try_with(|_| ()).is_err()
+}
+
+/// Builds a response for a user who has just signed in, and who had sent the request as a visitor.
+pub(super) async fn with_user<T>(
+    app: &App,
+    caller: Option<&Caller>,
+    response: impl Future<Output = T>,
+) -> T {
+    let signed_in = match caller {
+        Some(caller) => SignedIn::new(app, caller).await,
+        None => None,
+    };
+    match signed_in {
+        Some(user) => SENDER.scope(Sender::User(user), response).await,
+        None => response.await,
     }
 }
 
@@ -43,32 +90,24 @@ fn has_no_navigation(path: &str) -> bool {
         path.strip_prefix(prefix)
             .is_some_and(|rest| rest.starts_with('/'))
     };
-    is_below(API_BASE) || is_below("/static")
+    is_below(API_BASE) || is_below("/static") || path.ends_with(".svg")
 }
 
-/// Finds the signed-in user of a request for a page.
-pub async fn identify_viewer(State(app): State<App>, request: Request, next: Next) -> Response {
+/// Finds the signed-in user of a request for a page. The handler does not look up the session once more.
+pub async fn identify_viewer(State(app): State<App>, mut request: Request, next: Next) -> Response {
     if has_no_navigation(request.uri().path()) {
         return next.run(request).await;
     }
-    // If the database cannot be read, the page itself says so.
-    let caller = auth::session_caller(&app, request.headers()).await;
-    let Some(caller) = caller.ok().flatten() else {
-        return next.run(request).await;
+    let caller = match auth::session_caller(&app, request.headers()).await {
+        Ok(Some(caller)) => caller,
+        Ok(None) => return next.run(request).await,
+        // The page itself says what has failed.
+        Err(_) => return SENDER.scope(Sender::Unknown, next.run(request)).await,
     };
-    let Some(user) = caller.user() else {
-        return next.run(request).await;
-    };
-    let signed_in = SignedIn {
-        name: user.name.to_string(),
-        dashboard: match caller.is_organiser() {
-            true => "/organiser",
-            false => "/dashboard",
-        },
-        pending_decisions: match caller.is_organiser() {
-            true => pending_decisions::count(&app).await.unwrap_or_default(),
-            false => 0,
-        },
-    };
-    SIGNED_IN.scope(signed_in, next.run(request)).await
+    let signed_in = SignedIn::new(&app, &caller).await;
+    request.extensions_mut().insert(SessionCaller(caller));
+    match signed_in {
+        Some(user) => SENDER.scope(Sender::User(user), next.run(request)).await,
+        None => next.run(request).await,
+    }
 }

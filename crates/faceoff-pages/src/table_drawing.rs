@@ -61,6 +61,21 @@ pub(super) fn path(positions: &[Position]) -> String {
     out
 }
 
+/// The first and the last position, and those between that are at least `least_m` from the one kept before.
+pub(super) fn thinned(positions: &[Position], least_m: f64) -> Vec<Position> {
+    let mut kept: Vec<Position> = Vec::new();
+    for (index, position) in positions.iter().enumerate() {
+        let is_far = kept.last().is_none_or(|[x, y]| {
+            let [dx, dy] = [position[0] - x, position[1] - y];
+            dx * dx + dy * dy >= least_m * least_m
+        });
+        if is_far || index + 1 == positions.len() {
+            kept.push(*position);
+        }
+    }
+    kept
+}
+
 /// Dots at positions: lines of zero length, of which only the round ends are visible.
 pub(super) fn dots(positions: &[Position]) -> String {
     marks(positions, |x, y| format!("M{x} {y}h0"))
@@ -118,5 +133,13 @@ mod tests {
         assert_eq!(dots(&[[0.0, -0.0004]]), "M0 0h0");
         assert_eq!(crosses(&[[0.0, 0.1]]), "M-14 -114l28 28m0 -28l-28 28");
         assert_eq!(path(&[]), "");
+    }
+
+    #[test]
+    fn thinned_path_keeps_ends_and_drops_close_points() {
+        let positions = [0.0, 0.001, 0.012, 0.013, 0.025, 0.026].map(|x| [x, 0.0]);
+        let kept = thinned(&positions, 0.01).into_iter().map(|[x, _]| x);
+        assert_eq!(kept.collect::<Vec<_>>(), [0.0, 0.012, 0.025, 0.026]);
+        assert_eq!(thinned(&[], 0.01), Vec::<Position>::new());
     }
 }

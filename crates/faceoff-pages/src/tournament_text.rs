@@ -3,7 +3,7 @@
 use super::figures;
 use faceoff_api::views::tournament::{TournamentHead, TournamentPhase};
 use faceoff_replay::model::CONTROL_STEP_S;
-use faceoff_types::{RoundNumber, TournamentFormat, TournamentRules};
+use faceoff_types::{DepartureKind, RoundNumber, TournamentFormat, TournamentRules};
 
 pub(super) fn phase_label(head: &TournamentHead) -> String {
     let phase = match head.phase {
@@ -16,6 +16,13 @@ pub(super) fn phase_label(head: &TournamentHead) -> String {
     match (&head.paused, head.phase) {
         (Some(_), state) if state != TournamentPhase::Closed => format!("{phase}, paused"),
         _ => phase.to_owned(),
+    }
+}
+
+pub(super) const fn departure_label(kind: DepartureKind) -> &'static str {
+    match kind {
+        DepartureKind::Withdrawn => "withdrawn",
+        DepartureKind::Disqualified => "disqualified",
     }
 }
 

@@ -10,10 +10,13 @@ use faceoff_service::{
     auth::{Caller, Organiser},
     extract::{Json as Body, PathParam},
     problem::{Problem, ProblemKind},
-    services::{decisions::checked_reason, entrants},
-    views::{tournament, tournament_state::TournamentState},
+    services::{
+        decisions::checked_reason,
+        departures::{self, PlannedDeparture},
+        entrants,
+    },
+    views::tournament,
 };
-use faceoff_store::{Actor, DepartureRequest, GameState};
 use faceoff_types::{DepartureKind, TournamentId};
 use std::slice;
 
@@ -34,20 +37,7 @@ pub(crate) async fn enter_teams(
     PathParam(id): PathParam<TournamentId>,
     Body(NewEntrants { teams }): Body<NewEntrants>,
 ) -> Result<Json<TournamentView>, Problem> {
-    if teams.is_empty() {
-        return Err(Problem::invalid(
-            "teams",
-            "expected at least one name, got none",
-        ));
-    }
-    let state = TournamentState::without_standings(&app, id).await?;
-    let new_entrants = entrants::find_by_names(&app, "teams", &teams).await?;
-    entrants::check_count(state.entrants.len() + new_entrants.len())?;
-    let now = app.config.clock.now();
-    app.store
-        .add_entrants(organiser.actor(), id, &new_entrants, now)
-        .await?;
-    tracing::info!(tournament = %id, teams = new_entrants.len(), "teams entered");
+    entrants::enter_teams(&app, organiser.actor(), id, &teams).await?;
     tournament::find(&app, id).await.map(Json)
 }
 
@@ -78,16 +68,16 @@ pub(crate) async fn depart(
             "expected none for a withdrawal, got one; leave it out: finished rounds of a team that withdraws count",
         ));
     }
-    let state = TournamentState::find(&app, id).await?;
     let team = entrants::find_by_names(&app, "team", slice::from_ref(&departure.team)).await?[0];
-    let request = DepartureRequest {
+    let planned = PlannedDeparture {
         team,
         kind: departure.r#as,
         from_round: departure.from_round,
-        reason: reason.to_owned(),
+        reason: Some(reason),
     };
-    check_confirmed(&state, &request, departure.confirm.as_deref())?;
-    leave(&app, organiser.actor(), id, &request).await
+    let (actor, confirm) = (organiser.actor(), departure.confirm.as_deref());
+    departures::leave_tournament(&app, actor, id, &planned, confirm).await?;
+    tournament::find(&app, id).await.map(Json)
 }
 
 /// Withdraws the caller's team from a tournament, for good. Needs a member's token, not the team's.
@@ -113,87 +103,12 @@ pub(crate) async fn withdraw_team(
             "only a member of the team can withdraw it; organisers use POST /api/v1/tournaments/ID/departures",
         ));
     };
-    let reason = checked_reason(&reason)?;
-    let state = TournamentState::find(&app, id).await?;
-    let request = DepartureRequest {
+    let planned = PlannedDeparture {
         team: team.id,
         kind: DepartureKind::Withdrawn,
         from_round: None,
-        reason: reason.to_owned(),
+        reason: Some(&reason),
     };
-    check_confirmed(&state, &request, confirm.as_deref())?;
-    leave(&app, caller.actor(), id, &request).await
-}
-
-/// Refuses a departure that is not confirmed with the team's name; the problem describes its effects.
-fn check_confirmed(
-    state: &TournamentState,
-    departure: &DepartureRequest,
-    confirm: Option<&str>,
-) -> Result<(), Problem> {
-    let entrants = &mut state.entrants.iter();
-    let Some(entrant) = entrants.find(|entrant| entrant.team == departure.team) else {
-        return Err(Problem::new(
-            ProblemKind::Conflict,
-            format!("{} is not in the tournament", state.name(departure.team)?),
-        ));
-    };
-    let team_games = state
-        .games
-        .iter()
-        .filter(|game| game.teams.contains(&departure.team));
-    let open_games = team_games.filter(|game| {
-        !matches!(
-            game.state,
-            GameState::Played(_) | GameState::Cancelled { .. }
-        )
-    });
-    if state.rounds.is_empty() {
-        let effect = format!(
-            "{} would leave the tournament, whose first round has not started, and its unfinished test and friendly games \
-             would be cancelled; it may enter again",
-            entrant.name
-        );
-        return Problem::check_confirmed(confirm, entrant.name.as_str(), &effect);
-    }
-    if state.tournament.rules.plays_on(departure.kind) {
-        let effect = format!(
-            "{} would be withdrawn for good; its games of a running round would still be played and count, and it would not play in \
-             later rounds; its unfinished test and friendly games would be cancelled; the reason {:?} would be public",
-            entrant.name, departure.reason
-        );
-        return Problem::check_confirmed(confirm, entrant.name.as_str(), &effect);
-    }
-    let outcome = match departure.kind {
-        DepartureKind::Withdrawn => "be withdrawn",
-        DepartureKind::Disqualified => "be disqualified, and rank below all others",
-    };
-    let earlier_rounds = match departure.from_round {
-        Some(round) => format!(", and of all rounds from {round} on"),
-        None => String::new(),
-    };
-    let effect = format!(
-        "{} would {outcome} for good; {} of its games, and its unfinished test and friendly games, would be cancelled; its games of \
-         the running or next round{earlier_rounds} would not count; the reason {:?} would be public",
-        entrant.name,
-        open_games.count(),
-        departure.reason
-    );
-    Problem::check_confirmed(confirm, entrant.name.as_str(), &effect)
-}
-
-async fn leave(
-    app: &App,
-    actor: Actor,
-    id: TournamentId,
-    departure: &DepartureRequest,
-) -> Result<Json<TournamentView>, Problem> {
-    let now = app.config.clock.now();
-    app.store
-        .leave_tournament(actor, id, departure, now)
-        .await?;
-    tracing::info!(
-        tournament = %id, team = %departure.team, left_as = ?departure.kind, reason = departure.reason, "team left"
-    );
-    tournament::find(app, id).await.map(Json)
+    departures::leave_tournament(&app, caller.actor(), id, &planned, confirm.as_deref()).await?;
+    tournament::find(&app, id).await.map(Json)
 }

@@ -11,7 +11,7 @@ use faceoff_service::{
     auth::{Caller, Organiser},
     extract::{Json as Body, PathParam},
     problem::{Problem, ProblemKind},
-    services::decisions::checked_reason,
+    services::games,
     viewer::Viewer,
     views::{attempt, game, tournament_state::TournamentState},
 };
@@ -139,22 +139,8 @@ pub(crate) async fn void_game(
     PathParam(id): PathParam<GameId>,
     Body(decision): Body<Decision>,
 ) -> Result<Json<GameView>, Problem> {
-    let reason = checked_reason(&decision.reason)?;
-    let (state, game) = game::find_visible(&app, Viewer::Organiser, id).await?;
-    let [home, away] = game.teams;
-    let name = format!("{} - {}", state.name(home)?, state.name(away)?);
-    let effect = format!(
-        "the result of {name} would be voided at once, with the public reason {reason:?}; the next round would wait until \
-         the game is rerun, with the same seed and submissions"
-    );
-    Problem::check_confirmed(decision.confirm.as_deref(), &name, &effect)?;
-    let now = app.config.clock.now();
-    let voided = app
-        .store
-        .void_game(organiser.actor(), id, reason, now)
-        .await?;
-    tracing::info!(game = %id, reason, "game voided");
-    game::view(&state, Viewer::Organiser, &voided).map(Json)
+    games::void_game(&app, organiser.actor(), id, &decision).await?;
+    game::find(&app, Viewer::Organiser, id).await.map(Json)
 }
 
 /// Reruns a game that was voided or failed by a platform fault, with the same submissions and the same seed.
@@ -172,9 +158,6 @@ pub(crate) async fn rerun_game(
     State(app): State<App>,
     PathParam(id): PathParam<GameId>,
 ) -> Result<Json<GameView>, Problem> {
-    let (state, _) = game::find_visible(&app, Viewer::Organiser, id).await?;
-    let now = app.config.clock.now();
-    let queued = app.store.rerun_game(organiser.actor(), id, now).await?;
-    tracing::info!(game = %id, "game is rerun");
-    game::view(&state, Viewer::Organiser, &queued).map(Json)
+    games::rerun_game(&app, organiser.actor(), id).await?;
+    game::find(&app, Viewer::Organiser, id).await.map(Json)
 }

@@ -216,9 +216,18 @@ pub async fn session_caller(
     app: &AppState,
     headers: &HeaderMap,
 ) -> Result<Option<Caller>, Problem> {
-    let Some(secret) = session::session_cookie(&app.config, headers) else {
-        return Ok(None);
-    };
+    match session::session_cookie(&app.config, headers) {
+        Some(secret) => caller_with_session(app, secret).await,
+        None => Ok(None),
+    }
+}
+
+/// The caller with this secret of a session; `None` if it is not valid.
+///
+/// # Errors
+/// `Internal`: the database cannot be read.
+#[boxed]
+pub async fn caller_with_session(app: &AppState, secret: &str) -> Result<Option<Caller>, Problem> {
     let secret_hash = hash_token(secret);
     let now = app.config.clock.now();
     let verified = app
@@ -229,6 +238,10 @@ pub async fn session_caller(
         .ok()
         .map(|VerifiedToken { token, principal }| Caller::new(token, secret_hash, principal)))
 }
+
+/// Request extension: the caller of the request's session, which a layer has found already.
+#[derive(Debug, Clone)]
+pub struct SessionCaller(pub Caller);
 
 #[boxed]
 async fn authenticate(parts: &Parts, app: &App) -> Result<Option<Caller>, Problem> {
@@ -241,7 +254,15 @@ async fn authenticate(parts: &Parts, app: &App) -> Result<Option<Caller>, Proble
     // The time of a look-up by hash may depend on the hash. That is safe: a token whose hash shares a prefix with
     // another one cannot be chosen.
     let secret_hash = hash_token(token);
-    let verified = app.store.verify_token(secret_hash, kind, now).await?;
+    let known = parts.extensions.get::<SessionCaller>();
+    let known = known.filter(|known| known.0.secret_hash == secret_hash);
+    let verified = match known {
+        Some(SessionCaller(caller)) => Ok(VerifiedToken {
+            token: caller.token.clone(),
+            principal: caller.principal.clone(),
+        }),
+        None => app.store.verify_token(secret_hash, kind, now).await?,
+    };
     let VerifiedToken { token, principal } = match verified {
         Ok(verified) => verified,
         Err(rejection) => {

@@ -151,8 +151,10 @@ async fn episodes_are_hidden_before_the_release() {
             answer.problem(409, "not-yet", &["queued or running"]);
         }
     }
-    let page = day.site.get(&day.page, None).await;
-    assert_eq!(page.status, 409, "{}", page.body);
+    for path in ["", "/prepare/0/still.svg"] {
+        let page = day.site.get(&format!("{}{path}", day.page), None).await;
+        assert_eq!(page.status, 409, "{path}: {}", page.body);
+    }
 }
 
 #[tokio::test]
@@ -280,6 +282,103 @@ async fn clip_is_compressed_and_cached_by_etag() {
     let tag = headers["etag"].to_str().unwrap();
     let again = again.header("if-none-match", tag).send().await.unwrap();
     assert_eq!(again.status(), 304);
+}
+
+#[tokio::test]
+async fn list_shows_stills_that_browsers_keep() {
+    let day = record_day(true).await;
+    let page = day.page("").await;
+    let image = Selector::parse(".episodes tbody img").unwrap();
+    let addresses: Vec<_> = page
+        .select(&image)
+        .map(|image| {
+            assert_eq!(image.attr("loading"), Some("lazy"));
+            image.attr("src").unwrap().to_owned()
+        })
+        .collect();
+    assert_eq!(addresses.len(), EPISODES as usize);
+    let mut pictures = Vec::new();
+    for address in &addresses {
+        let picture = day.site.get(address, None).await;
+        assert_eq!(picture.status, 200, "{}", picture.body);
+        assert_eq!(picture.header("content-type"), "image/svg+xml");
+        let caching = picture.header("cache-control");
+        assert_eq!(caching, "private, max-age=31536000, immutable");
+        assert!(picture.body.contains("class=\"trajectory puck\" d=\"M"));
+        assert!(picture.body.len() < 8_000, "{}", picture.body.len());
+        // What the agent observed is not public.
+        let own = day.site.get(address, Some(&day.alpha.token)).await;
+        assert_eq!(own.body, picture.body);
+        pictures.push(picture.body);
+    }
+    pictures.dedup();
+    assert_eq!(pictures.len(), EPISODES as usize);
+
+    let first = day.site.get(&addresses[0], None).await;
+    let again = day.site.request(Method::GET, &addresses[0], None);
+    let again = again.header("if-none-match", first.header("etag"));
+    assert_eq!(again.send().await.unwrap().status(), 304);
+    // Without its version the picture is asked for again: it could be another one.
+    let (address, _) = addresses[0].split_once('?').unwrap();
+    let unversioned = day.site.get(address, None).await;
+    assert_eq!(unversioned.header("cache-control"), "private, no-cache");
+    assert_eq!(unversioned.body, first.body);
+    for missing in ["prepare/99", "juggle/0"] {
+        let path = format!("{}/{missing}/still.svg", day.page);
+        assert_eq!(day.site.get(&path, None).await.status, 404, "{missing}");
+    }
+}
+
+#[tokio::test]
+async fn frozen_boards_hide_stills() {
+    let site = Site::start().await;
+    let freeze = format!("/api/v1/stages/{}/freeze", site.stage().await);
+    site.post(&freeze, Some(ADMIN), &json!({ "reason": "surprise" }))
+        .await
+        .json(200);
+    site.next_day();
+    let day = record_day_on(site, true).await;
+    let episode = format!("{}/prepare/0", day.page);
+    for path in [episode.clone(), format!("{episode}/still.svg")] {
+        let hidden = day.site.get(&path, None).await;
+        assert_eq!(hidden.status, 409, "{path}: {}", hidden.body);
+        let own = day.site.get(&path, Some(&day.alpha.token)).await;
+        assert_eq!(own.status, 200, "{path}: {}", own.body);
+    }
+}
+
+#[tokio::test]
+async fn marks_of_maps_lead_to_replays() {
+    let day = record_day(true).await;
+    let page = day.page("").await;
+    let links = Selector::parse(".table-map a").unwrap();
+    let found: Vec<_> = page
+        .select(&links)
+        .map(|link| {
+            // The table has the same links for keyboards.
+            assert_eq!(link.attr("tabindex"), Some("-1"));
+            let name = link.text().collect::<String>();
+            (link.attr("href").unwrap().to_owned(), name)
+        })
+        .collect();
+    let view = day.get("episodes", None).await.json(200);
+    let lines = view["episodes"].as_array().unwrap();
+    for line in lines {
+        let episode = &line["episode"];
+        let outcome = match line["success"].as_bool() {
+            Some(true) => "solved",
+            _ => "not solved",
+        };
+        let link = (
+            format!("episodes/prepare/{episode}"),
+            format!("prepare {episode}: {outcome}"),
+        );
+        assert!(found.contains(&link), "{link:?} of {found:?}");
+    }
+    let (address, _) = &found[0];
+    // Relative to the page of the episodes.
+    let path = day.page.replace("episodes", address);
+    assert_eq!(day.site.get(&path, None).await.status, 200);
 }
 
 #[tokio::test]

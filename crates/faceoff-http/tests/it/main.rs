@@ -21,6 +21,7 @@ mod comparisons;
 mod confirmations;
 mod counting_evaluations;
 mod credentials;
+mod dashboard_tabs;
 mod days;
 mod decisions;
 mod deprecated_names;

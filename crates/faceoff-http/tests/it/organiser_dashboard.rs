@@ -35,11 +35,12 @@ async fn open_decision(grace: &mut Browser<'_>, path: &str, decision: &str) -> (
 }
 
 /// Pages of the organiser dashboard.
-const PAGES: [&str; 11] = [
+const PAGES: [&str; 12] = [
     "/organiser",
     "/organiser/day",
     "/organiser/teams",
     "/organiser/stages",
+    "/organiser/tournaments",
     "/organiser/messages",
     "/organiser/storage",
     "/organiser/workers",

@@ -2,7 +2,7 @@
 
 use crate::{
     browser::{Browser, PASSWORD, first_text, forms, invite},
-    html::{links, texts},
+    html::{attributes, links, texts},
     site::{ADMIN, Site, string},
 };
 use scraper::{Html, Selector};
@@ -304,6 +304,9 @@ async fn expired_session_keeps_the_typed_form() {
         .unwrap();
     let names: Vec<&str> = form.fields.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(names, ["title", "text"]);
+    let page = Html::parse_document(&signed_in.body);
+    let navigation = texts(&page, "header nav li");
+    assert_eq!(navigation.last().unwrap(), "Grace");
     let announcements = site.get("/api/v1/announcements", None).await.json(200);
     assert_eq!(announcements, json!([]), "nothing is sent by signing in");
     let fields: Vec<(&str, &str)> = form
@@ -319,6 +322,66 @@ async fn expired_session_keeps_the_typed_form() {
     let announcements = site.get("/api/v1/announcements", None).await.json(200);
     assert_eq!(announcements[0]["title"], "No day on Sunday");
     assert_eq!(announcements[0]["text"], "Line <1>\nline \"2\"");
+}
+
+#[tokio::test]
+async fn hidden_fields_of_a_kept_form_stay_hidden() {
+    let site = Site::start().await;
+    let role = json!({ "role": "organiser", "note": "Grace" });
+    let mut grace = Browser::join(&site, "Grace", role).await;
+    let session = grace.cookie.take();
+    let person = "6b1f0a1e-6f0b-4d3a-9b57-0d8f2f3f7a11";
+    let typed = [("role", "return"), ("person", person), ("note", "for Ben")];
+    let asked = grace.submit("/organiser/access/invitations", &typed).await;
+    let sign_in = forms("/sign-in", &asked)
+        .into_iter()
+        .find(|form| form.action == "/sign-in")
+        .unwrap();
+    let mut fields: Vec<(&str, &str)> = vec![("name", "Grace"), ("password", PASSWORD)];
+    fields.extend(
+        sign_in
+            .fields
+            .iter()
+            .map(|(name, value)| (name.as_str(), value.as_str()))
+            .filter(|(name, _)| !["name", "password"].contains(name)),
+    );
+    let page = grace.submit("/sign-in", &fields).await;
+    assert_ne!(grace.cookie, session);
+    let html = page.html(200);
+    let names = |selector: &str| attributes(&html, selector, "name");
+    assert_eq!(names("main input[type=hidden]"), ["role", "person"]);
+    assert_eq!(names("main input:not([type=hidden])"), ["note"]);
+    assert_eq!(texts(&html, "main label"), ["Note"]);
+}
+
+#[tokio::test]
+async fn failing_database_is_no_expired_session() {
+    let site = Site::start().await;
+    let role = json!({ "role": "organiser", "note": "Grace" });
+    let mut grace = Browser::join(&site, "Grace", role).await;
+    site.store.close().await;
+    let typed = [
+        ("title", "No day on Sunday"),
+        ("text", "It rains."),
+        ("password", "my secret"),
+    ];
+    let failed = grace.submit("/organiser/messages", &typed).await;
+    let html = failed.html(500);
+    assert!(
+        !texts(&html, "h1")[0].contains("Sign in"),
+        "{}",
+        failed.body
+    );
+    assert!(texts(&html, "[role=alert]")[0].contains("x-request-id"));
+    assert!(!failed.body.contains("my secret"), "{}", failed.body);
+    let form = forms("/organiser/messages", &failed).remove(0);
+    assert_eq!(form.action, "/organiser/messages");
+    let title = ("title".to_owned(), "No day on Sunday".to_owned());
+    assert!(form.fields.contains(&title), "{form:?}");
+    // Without anything typed the page shows the problem alone.
+    let failed = grace.submit("/organiser/decide/resume", &[]).await;
+    assert_eq!(failed.status, 500);
+    assert!(forms("/organiser", &failed).is_empty(), "{}", failed.body);
 }
 
 #[tokio::test]

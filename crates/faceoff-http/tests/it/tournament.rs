@@ -10,6 +10,7 @@ mod formats;
 mod game_page;
 mod invalid_input;
 mod live;
+mod organiser_pages;
 mod pages;
 mod paper_results;
 mod replays;

@@ -58,20 +58,22 @@ impl FrontPage {
         visibility: &Visibility,
         board: &BoardView,
         groups: &[Group<OverallRow>],
+        takes_registrations: bool,
     ) -> Result<Self, PageProblem> {
         let competition = app.config.competition();
         let highlight = match competition.has_replays {
             true => highlight::of_board(app, visibility, &board.rows).await,
             false => None,
         };
-        let season = app.store.season().await?;
-        let is_open = season.registration_open && season.closed_at.is_none();
         let announcements = app.store.announcements(1).await?;
         Ok(Self {
             title: competition.title.clone(),
             summary: competition.summary.clone(),
             leader: Leader::find(board, groups),
-            take_part: if is_open { "/register" } else { "/docs/start" },
+            take_part: match takes_registrations {
+                true => "/register",
+                false => "/docs/start",
+            },
             news: announcements.into_iter().next().map(|newest| News {
                 id: newest.id,
                 title: newest.title,

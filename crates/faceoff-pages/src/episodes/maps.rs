@@ -1,12 +1,32 @@
 //! Start positions and violations of episodes on the table.
 
 use crate::{
+    episode_text::group_label,
     figures,
-    table_drawing::{self, Position},
+    table_drawing::{self, Dot, Position},
     violation_map::ViolationMarks,
 };
 use faceoff_replay::{EpisodeLine, Group};
 use faceoff_types::Task;
+
+/// A link to the replay of an episode, around its mark on a map.
+pub(super) struct EpisodeLink {
+    /// Address relative to the page.
+    pub(super) address: String,
+    pub(super) name: String,
+    pub(super) dot: Dot,
+}
+
+impl EpisodeLink {
+    fn new(line: &EpisodeLine, position: Position, what: &str) -> Self {
+        let EpisodeLine { task, episode, .. } = line;
+        Self {
+            address: format!("episodes/{task}/{episode}"),
+            name: format!("{task} {episode}: {what}"),
+            dot: Dot::at(position),
+        }
+    }
+}
 
 /// Start positions of the puck in the episodes of a task: solved ones as dots, others as crosses.
 pub(super) struct StartMap {
@@ -17,6 +37,7 @@ pub(super) struct StartMap {
     pub(super) failed: String,
     pub(super) solved_count: usize,
     pub(super) failed_count: usize,
+    pub(super) links: Vec<EpisodeLink>,
     /// Success rates by the position across the table and the speed of the puck at the start.
     pub(super) tables: Vec<SuccessTable>,
 }
@@ -56,12 +77,21 @@ impl StartMap {
                 .collect()
         };
         let (solved, failed) = (starts(true), starts(false));
+        let links = lines.iter().filter_map(|line| {
+            let [x, y, ..] = line.start?;
+            let what = match line.success {
+                true => "solved",
+                false => "not solved",
+            };
+            Some(EpisodeLink::new(line, [x, y], what))
+        });
         Some(Self {
             task,
             solved: table_drawing::dots(&solved),
             failed: table_drawing::crosses(&failed),
             solved_count: solved.len(),
             failed_count: failed.len(),
+            links: links.collect(),
             tables: [
                 SuccessTable {
                     id: format!("across-{task}"),
@@ -127,6 +157,7 @@ fn success_by(
 /// First violations of episodes, by position on the table and by joint.
 pub(super) struct ViolationMap {
     pub(super) marks: Vec<ViolationMarks>,
+    pub(super) links: Vec<EpisodeLink>,
     pub(super) joints: Vec<Joint>,
     pub(super) episodes: usize,
 }
@@ -147,6 +178,14 @@ impl ViolationMap {
             let matching = violations().filter(|violation| violation.group == group.name());
             matching.filter_map(|violation| violation.at).collect()
         });
+        let links = lines.iter().flat_map(|line| {
+            let violations = line.broken.iter();
+            violations.filter_map(|violation| {
+                let mut groups = Group::ALL.into_iter();
+                let group = groups.find(|group| group.name() == violation.group)?;
+                Some(EpisodeLink::new(line, violation.at?, group_label(group)))
+            })
+        });
         let count = |group: Group, joint| {
             let matching = violations().filter(|violation| {
                 violation.group == group.name() && violation.joint == Some(joint)
@@ -163,6 +202,7 @@ impl ViolationMap {
             .collect();
         Self {
             marks,
+            links: links.collect(),
             joints,
             episodes: lines.iter().filter(|line| !line.broken.is_empty()).count(),
         }

@@ -1,5 +1,6 @@
 //! Rows of the table of episodes.
 
+use super::still;
 use crate::{episode_text::describe_violation, figures, replay::page_path};
 use faceoff_replay::EpisodeLine;
 use faceoff_types::{Competition, EvaluationId, Task};
@@ -10,6 +11,8 @@ pub(super) struct Row {
     pub(super) episode: u32,
     /// The page of its replay, if it has one.
     pub(super) path: Option<String>,
+    /// Address of a still picture, if it has a replay.
+    pub(super) still: Option<String>,
     pub(super) success: bool,
     pub(super) end_reason: String,
     pub(super) violations: Vec<String>,
@@ -19,12 +22,20 @@ pub(super) struct Row {
 }
 
 impl Row {
-    pub(super) fn new(competition: &Competition, id: EvaluationId, line: &EpisodeLine) -> Self {
+    pub(super) fn new(
+        competition: &Competition,
+        id: EvaluationId,
+        line: &EpisodeLine,
+        still_version: &str,
+    ) -> Self {
         let EpisodeLine { task, episode, .. } = line;
         Self {
             task: *task,
             episode: *episode,
             path: line.has_clips().then(|| page_path(id, *task, *episode)),
+            still: line
+                .has_clips()
+                .then(|| still::address(id, *task, *episode, still_version)),
             success: line.success,
             end_reason: line.why.clone(),
             violations: line

@@ -1,6 +1,10 @@
 //! `/organiser`: open tasks of the organisers and the status of the season.
 
-use super::checklist::{self, Step};
+use super::{
+    checklist::{self, Step},
+    tournament,
+    tournaments::decision_text,
+};
 use crate::{
     board_status,
     dashboard_frame::{self, DashboardHeader, DoneQuery, Notice},
@@ -18,8 +22,11 @@ use faceoff_service::{
     app::App,
     problem::Problem,
     views::{
-        capacity, day, evaluation, health, pending_decisions, queue, stage, storage,
-        visibility::Visibility, workers,
+        capacity, day, evaluation, health,
+        pending_decisions::{self, TournamentDecisionKind},
+        queue, stage, storage,
+        visibility::Visibility,
+        workers,
     },
 };
 use faceoff_store::{RegistrationState, Stage, StagePhase};
@@ -227,6 +234,20 @@ async fn request_items(app: &App) -> Result<Vec<Item>, Problem> {
     Ok(items)
 }
 
+async fn tournament_items(app: &App) -> Result<Vec<Item>, Problem> {
+    let decisions = pending_decisions::of_tournaments(app).await?.into_iter();
+    let items = decisions.map(|decision| Item {
+        class: match decision.kind {
+            TournamentDecisionKind::Rerun { .. } => "bad",
+            TournamentDecisionKind::StartRound | TournamentDecisionKind::Close => "waiting",
+        },
+        detail: decision_text(decision.kind),
+        title: format!("{} needs a decision", decision.name),
+        links: vec![(tournament::page_path(decision.id), "Tournament".into())],
+    });
+    Ok(items.collect())
+}
+
 /// Evaluations of a day that failed because of a platform fault or were not played, and are not repeated.
 async fn failures(app: &App, day: StageDay) -> Result<Vec<Item>, Problem> {
     let visibility = Visibility::for_organiser(app).await?;
@@ -353,6 +374,7 @@ pub(super) async fn page(
         stages.push(summary);
     }
     items.extend(request_items(&app).await?);
+    items.extend(tournament_items(&app).await?);
     // Problems first; the sort is stable.
     items.sort_by_key(|item| item.class != "bad");
     let path = "/organiser";

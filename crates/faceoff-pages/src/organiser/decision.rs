@@ -3,10 +3,12 @@
 mod clock;
 mod day;
 mod evaluation;
+mod game;
 mod preview;
 mod queue;
 mod stage;
 mod team;
+mod tournament;
 mod worker;
 
 use clock::ClockDecision;
@@ -14,12 +16,15 @@ use day::DayDecision;
 use evaluation::EvaluationDecision;
 use faceoff_api::requests;
 use faceoff_service::{app::AppState, auth::Organiser, problem::Problem};
+use faceoff_types::DepartureKind;
+use game::GameDecision;
 pub(super) use preview::DecisionPreview;
 use preview::Done;
 use queue::QueueDecision;
 use stage::StageDecision;
 use std::{fmt, str::FromStr};
 use team::TeamDecision;
+use tournament::TournamentDecision;
 use worker::WorkerDecision;
 
 /// A decision, parsed from the path of its page.
@@ -30,6 +35,8 @@ pub(super) enum Decision {
     Evaluation(EvaluationDecision),
     Team(TeamDecision),
     Stage(StageDecision),
+    Tournament(TournamentDecision),
+    Game(GameDecision),
     Worker(WorkerDecision),
     Clock(ClockDecision),
 }
@@ -78,6 +85,29 @@ fn find(name: &str, subject: &str) -> Option<Decision> {
         "unfreeze" => Decision::Stage(StageDecision::Unfreeze(subject.parse().ok()?)),
         "final-day" => Decision::Stage(StageDecision::FinalDay(subject.parse().ok()?)),
         "sign-off" => Decision::Stage(StageDecision::SignOff(subject.parse().ok()?)),
+        "start-round" => {
+            Decision::Tournament(TournamentDecision::StartRound(subject.parse().ok()?))
+        }
+        "pause-tournament" => {
+            Decision::Tournament(TournamentDecision::Pause(subject.parse().ok()?))
+        }
+        "resume-tournament" => {
+            Decision::Tournament(TournamentDecision::Resume(subject.parse().ok()?))
+        }
+        "close-tournament" => {
+            Decision::Tournament(TournamentDecision::Close(subject.parse().ok()?))
+        }
+        "withdraw-team" | "disqualify-team" => {
+            let (tournament, team) = subject.split_once('/')?;
+            let (tournament, team) = (tournament.parse().ok()?, team.parse().ok()?);
+            let kind = match name {
+                "withdraw-team" => DepartureKind::Withdrawn,
+                _ => DepartureKind::Disqualified,
+            };
+            Decision::Tournament(TournamentDecision::Leave(tournament, team, kind))
+        }
+        "void-game" => Decision::Game(GameDecision::Void(subject.parse().ok()?)),
+        "rerun-game" => Decision::Game(GameDecision::Rerun(subject.parse().ok()?)),
         "ban" => Decision::Worker(WorkerDecision::Ban(subject.parse().ok()?)),
         "readmit" => Decision::Worker(WorkerDecision::Readmit(subject.parse().ok()?)),
         _ => return None,
@@ -92,6 +122,8 @@ impl Decision {
             Self::Evaluation(decision) => decision.preview(app).await,
             Self::Team(decision) => decision.preview(app).await,
             Self::Stage(decision) => decision.preview(app).await,
+            Self::Tournament(decision) => decision.preview(app).await,
+            Self::Game(decision) => decision.preview(app).await,
             Self::Worker(decision) => Ok(decision.preview()),
             Self::Clock(decision) => decision.preview(app),
         }
@@ -111,6 +143,8 @@ impl Decision {
             Self::Evaluation(decision) => decision.carry_out(app, actor, request).await,
             Self::Team(decision) => decision.carry_out(app, organiser, request).await,
             Self::Stage(decision) => decision.carry_out(app, actor, request).await,
+            Self::Tournament(decision) => decision.carry_out(app, actor, request).await,
+            Self::Game(decision) => decision.carry_out(app, actor, request).await,
             Self::Worker(decision) => decision.carry_out(app, actor, request).await,
             Self::Clock(decision) => decision.carry_out(app, actor, request).await,
         }

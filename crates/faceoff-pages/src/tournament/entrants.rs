@@ -1,7 +1,7 @@
 //! Teams of a tournament with their submissions by round.
 
-use super::{schedule::is_hidden, standings};
-use crate::{figures::utc_minute, spoilers::Spoilers};
+use super::schedule::is_hidden;
+use crate::{figures::utc_minute, spoilers::Spoilers, tournament_text::departure_label};
 use faceoff_api::views::tournament::TournamentView;
 use faceoff_service::{app::AppState, problem::Problem};
 use faceoff_types::{RoundNumber, SubmissionId, TeamId, TeamName};
@@ -41,7 +41,7 @@ pub(super) async fn entrants(
             });
         }
         let departure = entrant.departure.as_ref().map(|departure| {
-            let kind = standings::departure_label(departure.r#as);
+            let kind = departure_label(departure.r#as);
             let from = departure.from_round;
             match spoilers.hides_results() {
                 true => format!("{kind} from round {from}"),

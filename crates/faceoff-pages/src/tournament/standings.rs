@@ -1,9 +1,9 @@
 //! Standings of a tournament for its page.
 
-use crate::figures;
+use crate::{figures, tournament_text::departure_label};
 use faceoff_scoring::tournament::schedule::{Table, TableScope};
 use faceoff_service::{problem::Problem, views::tournament_state::TournamentState};
-use faceoff_types::{DepartureKind, TeamId, TeamName};
+use faceoff_types::{TeamId, TeamName};
 
 /// Standings of all rounds, of the final or of a group.
 pub(super) struct Standings {
@@ -82,13 +82,6 @@ impl Standings {
             },
             rows,
         })
-    }
-}
-
-pub(super) const fn departure_label(kind: DepartureKind) -> &'static str {
-    match kind {
-        DepartureKind::Withdrawn => "withdrawn",
-        DepartureKind::Disqualified => "disqualified",
     }
 }
 

@@ -4,12 +4,12 @@ use crate::{
     app::AppState,
     boxed,
     problem::Problem,
-    views::{board, visibility::Visibility},
+    views::{board, tournament_state::TournamentState, visibility::Visibility},
 };
 use faceoff_api::requests::BoardQuery;
 use faceoff_scoring::tournament::schedule::MAX_ENTRANTS;
-use faceoff_store::Stage;
-use faceoff_types::{TeamId, TeamName, Tier};
+use faceoff_store::{Actor, Stage};
+use faceoff_types::{TeamId, TeamName, Tier, TournamentId};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The teams with these names, ignoring case.
@@ -40,6 +40,34 @@ pub async fn find_by_names(
         ids.push(*id);
     }
     Ok(ids)
+}
+
+/// Enters the teams with these names into a tournament.
+///
+/// # Errors
+/// `InvalidContent`: there is no name, or it is unknown; `Conflict` if a team has entered or left, or no more can enter.
+#[boxed]
+pub async fn enter_teams(
+    app: &AppState,
+    actor: Actor,
+    id: TournamentId,
+    names: &[TeamName],
+) -> Result<(), Problem> {
+    if names.is_empty() {
+        return Err(Problem::invalid(
+            "teams",
+            "expected at least one name, got none",
+        ));
+    }
+    let state = TournamentState::without_standings(app, id).await?;
+    let new_entrants = find_by_names(app, "teams", names).await?;
+    check_count(state.entrants.len() + new_entrants.len())?;
+    let now = app.config.clock.now();
+    app.store
+        .add_entrants(actor, id, &new_entrants, now)
+        .await?;
+    tracing::info!(tournament = %id, teams = new_entrants.len(), "teams entered");
+    Ok(())
 }
 
 /// Refuses more entrants than a schedule supports. Teams that have left the tournament count.

@@ -1,9 +1,15 @@
-//! What waits for a decision of the organisers: registrations, questions, results of closed stages, and evaluations without a result
-//! through no fault of the agent.
+//! Pending decisions of the organisers: registrations, questions, results of closed stages, evaluations without a result through no fault
+//! of the agent, and tournaments that do not go on without an organiser.
 
-use crate::{app::AppState, boxed, problem::Problem};
-use faceoff_store::{Evaluation, EvaluationState, RegistrationState, StagePhase};
-use faceoff_types::EvaluationId;
+use crate::{
+    app::AppState,
+    boxed,
+    problem::Problem,
+    views::{tournament, tournament_state::TournamentState},
+};
+use faceoff_api::views::tournament::TournamentPhase;
+use faceoff_store::{Evaluation, EvaluationState, GameState, RegistrationState, StagePhase};
+use faceoff_types::{EvaluationId, StageName, TournamentId};
 use std::{collections::BTreeSet, sync::Arc};
 
 /// The number of pending decisions; `None` if the database cannot be read, which the page itself says.
@@ -39,7 +45,61 @@ async fn count_now(app: &AppState) -> Result<usize, Problem> {
             in_stages += evaluations_to_repeat(&evaluations).count();
         }
     }
-    Ok(registrations + questions + in_stages)
+    let in_tournaments = of_tournaments(app).await?.len();
+    Ok(registrations + questions + in_stages + in_tournaments)
+}
+
+/// A pending decision about a tournament.
+#[derive(Debug, Clone)]
+pub struct TournamentDecision {
+    pub id: TournamentId,
+    pub name: StageName,
+    pub kind: TournamentDecisionKind,
+}
+
+/// What has to be decided about a tournament.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TournamentDecisionKind {
+    /// Rerun this many games, which are void or failed by a platform fault.
+    Rerun { games: usize },
+    /// Start the next round.
+    StartRound,
+    /// Close it: all rounds are over.
+    Close,
+}
+
+/// The pending decisions about tournaments, in order of creation. A tournament without a started round has none: teams may still enter.
+#[boxed]
+pub async fn of_tournaments(app: &AppState) -> Result<Vec<TournamentDecision>, Problem> {
+    let mut decisions = Vec::new();
+    for tournament in app.store.tournaments().await? {
+        if tournament.closed_at.is_some() {
+            continue;
+        }
+        let state = TournamentState::without_standings(app, tournament.id).await?;
+        let is_void_or_failed = |state: &GameState| {
+            matches!(
+                state,
+                GameState::Void { .. } | GameState::PlatformFailed { .. }
+            )
+        };
+        let to_rerun = state
+            .games
+            .iter()
+            .filter(|game| state.needs_result(game) && is_void_or_failed(&game.state));
+        let kind = match (to_rerun.count(), tournament::phase(&state)) {
+            (0, TournamentPhase::Between) => TournamentDecisionKind::StartRound,
+            (0, TournamentPhase::Played) => TournamentDecisionKind::Close,
+            (0, _) => continue,
+            (games, _) => TournamentDecisionKind::Rerun { games },
+        };
+        decisions.push(TournamentDecision {
+            id: tournament.id,
+            name: tournament.name,
+            kind,
+        });
+    }
+    Ok(decisions)
 }
 
 /// Evaluations of a day that have no result through no fault of the agent, and that nothing has replaced yet.

@@ -72,6 +72,8 @@ pub struct SeasonSummary {
     pub commitment: String,
     /// If an organiser paused the queue: since when, and why.
     pub paused: Option<RulingView>,
+    /// Whether teams can register now.
+    pub takes_registrations: bool,
 }
 
 impl SeasonSummary {
@@ -81,6 +83,7 @@ impl SeasonSummary {
         let season = app.store.season().await?;
         update_has_tournaments(app).await?;
         Ok(Self {
+            takes_registrations: season.registration_open && season.closed_at.is_none(),
             name: season.name,
             commitment: season.commitment,
             paused: season.paused.map(ruling::view),

@@ -173,7 +173,7 @@ fn games_in_round(
         })
 }
 
-fn phase(state: &TournamentState) -> TournamentPhase {
+pub(super) fn phase(state: &TournamentState) -> TournamentPhase {
     let last_round = state.tournament.rules.format.last_round();
     if state.tournament.closed_at.is_some() {
         TournamentPhase::Closed

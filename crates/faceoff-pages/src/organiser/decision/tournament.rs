@@ -1,0 +1,140 @@
+//! Decisions about a tournament: start its next round, pause, resume or close it, and let a team leave it.
+
+use super::preview::{DecisionPreview, Done, PUBLIC_REASON};
+use crate::organiser::tournament::page_path;
+use faceoff_api::requests;
+use faceoff_service::{
+    app::AppState,
+    problem::Problem,
+    services::{
+        departures::{self, PlannedDeparture},
+        tournament_rounds, tournaments,
+    },
+};
+use faceoff_store::Actor;
+use faceoff_types::{DepartureKind, TeamId, TournamentId};
+
+#[derive(Debug, Clone, Copy)]
+pub(in crate::organiser) enum TournamentDecision {
+    StartRound(TournamentId),
+    Pause(TournamentId),
+    Resume(TournamentId),
+    Close(TournamentId),
+    Leave(TournamentId, TeamId, DepartureKind),
+}
+
+const fn departure(team: TeamId, kind: DepartureKind) -> PlannedDeparture<'static> {
+    PlannedDeparture {
+        team,
+        kind,
+        from_round: None,
+        reason: None,
+    }
+}
+
+impl TournamentDecision {
+    const fn tournament(self) -> TournamentId {
+        let (Self::StartRound(id)
+        | Self::Pause(id)
+        | Self::Resume(id)
+        | Self::Close(id)
+        | Self::Leave(id, ..)) = self;
+        id
+    }
+
+    pub(super) async fn preview(self, app: &AppState) -> Result<DecisionPreview, Problem> {
+        let id = self.tournament();
+        let return_path = page_path(id);
+        let preview = DecisionPreview::new(return_path.clone());
+        let record = app.store.tournament_record(id).await?;
+        let name = &record.tournament.name;
+        Ok(match self {
+            Self::StartRound(_) => {
+                let teams = record.entrants.iter();
+                DecisionPreview {
+                    title: format!("Start round {} of {name}", record.rounds.len() + 1),
+                    effects: format!(
+                        "The games between the {} teams are drawn and queued. The submission of each team that is active now plays the \
+                         whole round; later uploads are for the next one.",
+                        teams.filter(|entrant| entrant.departure.is_none()).count()
+                    ),
+                    button: "Start the round",
+                    ..preview
+                }
+            }
+            Self::Pause(_) => DecisionPreview {
+                title: format!("Pause {name}"),
+                effects: "No further game starts, test and friendly games included. Running games continue. The tournament’s page \
+                          shows the reason."
+                    .to_owned(),
+                reason_readers: Some(PUBLIC_REASON),
+                button: "Pause the tournament",
+                ..preview
+            },
+            Self::Resume(_) => DecisionPreview {
+                title: format!("Resume {name}"),
+                effects: "Queued games start again at once.".to_owned(),
+                button: "Resume the tournament",
+                ..preview
+            },
+            Self::Close(_) => DecisionPreview {
+                title: format!("Close {name}"),
+                button: "Close the tournament",
+                ..DecisionPreview::confirmed(
+                    tournaments::preview_close(app, id).await?,
+                    return_path,
+                )
+            },
+            Self::Leave(_, team, kind) => {
+                let effects =
+                    departures::preview_departure(app, id, &departure(team, kind)).await?;
+                let (verb, button) = match kind {
+                    DepartureKind::Withdrawn => ("Withdraw", "Withdraw the team"),
+                    DepartureKind::Disqualified => ("Disqualify", "Disqualify the team"),
+                };
+                DecisionPreview {
+                    title: format!("{verb} {} from {name}", effects.name),
+                    reason_readers: Some(PUBLIC_REASON),
+                    button,
+                    ..DecisionPreview::confirmed(effects, return_path)
+                }
+            }
+        })
+    }
+
+    pub(super) async fn carry_out(
+        self,
+        app: &AppState,
+        actor: Actor,
+        request: requests::Decision,
+    ) -> Result<Done, Problem> {
+        let confirm = request.confirm.as_deref();
+        let notice = match self {
+            Self::StartRound(id) => {
+                tournament_rounds::start_round(app, actor, id).await?;
+                "round-started"
+            }
+            Self::Pause(id) => {
+                tournaments::pause_tournament(app, actor, id, &request.reason).await?;
+                "tournament-paused"
+            }
+            Self::Resume(id) => {
+                tournaments::resume_tournament(app, actor, id).await?;
+                "tournament-resumed"
+            }
+            Self::Close(id) => {
+                tournaments::close_tournament(app, actor, id, confirm).await?;
+                "tournament-closed"
+            }
+            Self::Leave(id, team, kind) => {
+                let planned = PlannedDeparture {
+                    reason: Some(&request.reason),
+                    ..departure(team, kind)
+                };
+                departures::leave_tournament(app, actor, id, &planned, confirm).await?;
+                "team-left"
+            }
+        };
+        Ok(Done::new(notice, page_path(self.tournament())))
+    }
+}

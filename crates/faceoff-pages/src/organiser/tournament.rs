@@ -1,0 +1,140 @@
+//! `/organiser/tournaments/{id}`: status, games, teams and decisions of a tournament.
+
+use super::tournaments::{PATH, game_counts};
+use crate::{
+    dashboard_frame::{DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
+    frame::{Frame, PageProblem},
+    game_row::{GameRow, GameState},
+    page_auth::PageOrganiser,
+    tournament_text,
+};
+use askama::Template;
+use axum::{
+    extract::{Query, State},
+    response::Response,
+};
+use faceoff_api::views::tournament::{TournamentPhase, TournamentView};
+use faceoff_service::{
+    app::App,
+    extract::{PageForm, PathParam},
+    problem::Problem,
+    services::entrants,
+    viewer::Viewer,
+    views::{game, tournament, tournament_state::TournamentState},
+};
+use faceoff_types::{TeamName, TournamentFormat, TournamentId};
+use serde::Deserialize;
+
+#[derive(Template)]
+#[template(path = "organiser_tournament.html")]
+struct Page {
+    frame: Frame,
+    head: DashboardHeader,
+    view: TournamentView,
+    phase: String,
+    format: String,
+    last_round: String,
+    /// Teams that have not left.
+    teams: usize,
+    /// Games of the started rounds: with a result, and all.
+    played: u32,
+    games: u32,
+    /// Games without a result that have to be rerun.
+    to_rerun: Vec<GameRow>,
+    /// Games with a result, which can be voided. The last round first.
+    with_result: Vec<GameRow>,
+    is_closed: bool,
+    can_start_round: bool,
+    can_close: bool,
+    can_enter: bool,
+    form: EntrantsForm,
+}
+
+/// Teams to enter.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct EntrantsForm {
+    /// One name per line.
+    teams: String,
+}
+
+/// Path of a tournament's page.
+pub(super) fn page_path(id: TournamentId) -> String {
+    format!("{PATH}/{id}")
+}
+
+async fn page_with(
+    app: &App,
+    user: &PageOrganiser,
+    id: TournamentId,
+    notice: Notice<'_>,
+    form: EntrantsForm,
+) -> Result<Response, PageProblem> {
+    let state = TournamentState::find(app, id).await?;
+    let view = tournament::view(&state)?;
+    let all_games = game::round_games(&state, Viewer::Organiser, None)?;
+    let all_games = all_games.iter().rev();
+    let all_games: Vec<GameRow> = all_games
+        .filter_map(|game| GameRow::new(game, false))
+        .filter(|game| game.withdrawn_team.is_none())
+        .collect();
+    let select = |is_selected: fn(&GameState) -> bool| {
+        let selected = all_games.iter().filter(|game| is_selected(&game.state));
+        selected.cloned().collect::<Vec<_>>()
+    };
+    let phase = view.head.phase;
+    let can_start_round = matches!(phase, TournamentPhase::Open | TournamentPhase::Between);
+    let has_groups = matches!(view.rules.format, TournamentFormat::Groups { .. });
+    let (played, games) = game_counts(&view);
+    let teams = view.entrants.iter();
+    let page = Page {
+        frame: Frame::load(app, "").await?,
+        head: DashboardHeader::new(&user.caller, PATH, notice),
+        phase: tournament_text::phase_label(&view.head),
+        format: tournament_text::describe_format(&view.rules),
+        last_round: view.rules.format.last_round().to_string(),
+        teams: teams.filter(|team| team.departure.is_none()).count(),
+        played,
+        games,
+        to_rerun: select(|state| matches!(state, GameState::Void | GameState::Failed)),
+        with_result: select(|state| matches!(state, GameState::Played { .. })),
+        is_closed: phase == TournamentPhase::Closed,
+        can_start_round,
+        can_close: can_start_round || phase == TournamentPhase::Played,
+        can_enter: phase == TournamentPhase::Open
+            || phase == TournamentPhase::Between && !has_groups,
+        form,
+        view,
+    };
+    render_dashboard(&page, notice)
+}
+
+pub(super) async fn page(
+    user: PageOrganiser,
+    State(app): State<App>,
+    id: Result<PathParam<TournamentId>, Problem>,
+    Query(notice): Query<DoneQuery>,
+) -> Result<Response, PageProblem> {
+    let form = EntrantsForm::default();
+    page_with(&app, &user, id?.0, Notice::Done(&notice), form).await
+}
+
+/// Enters teams into the tournament.
+pub(super) async fn enter(
+    user: PageOrganiser,
+    State(app): State<App>,
+    id: Result<PathParam<TournamentId>, Problem>,
+    form: Result<PageForm<EntrantsForm>, Problem>,
+) -> Result<Response, PageProblem> {
+    let (PathParam(id), PageForm(form)) = (id?, form?);
+    let names = form.teams.lines().map(str::trim);
+    let names = names.filter(|name| !name.is_empty()).map(str::parse);
+    let entered = match names.collect::<Result<Vec<TeamName>, _>>() {
+        Ok(names) => entrants::enter_teams(&app, user.organiser.actor(), id, &names).await,
+        Err(error) => Err(Problem::invalid("teams", error)),
+    };
+    match entered {
+        Ok(()) => Ok(redirect_done(&page_path(id), "teams-entered")),
+        Err(problem) => page_with(&app, &user, id, Notice::Refused(&problem), form).await,
+    }
+}
