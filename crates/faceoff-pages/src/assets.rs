@@ -63,6 +63,11 @@ pub(super) static EPISODES_STYLE: Asset = Asset::new(
     CSS,
     compressed_text!("web/static/episodes.css"),
 );
+pub(super) static EPISODE_LIST_STYLE: Asset = Asset::new(
+    "/static/episode-list.css",
+    CSS,
+    compressed_text!("web/static/episode-list.css"),
+);
 pub(super) static REPLAY_STYLE: Asset = Asset::new(
     "/static/replay.css",
     CSS,
@@ -81,7 +86,7 @@ pub(super) static REPLAY_SCRIPT: Asset = Asset::new(
     compressed_text!("web/client/dist/replay.js"),
 );
 
-static ALL: [&Asset; 11] = [
+static ALL: [&Asset; 12] = [
     &STYLE,
     &SCRIPT,
     &ICON,
@@ -90,6 +95,7 @@ static ALL: [&Asset; 11] = [
     &DOCS_STYLE,
     &DOCS_SCRIPT,
     &EPISODES_STYLE,
+    &EPISODE_LIST_STYLE,
     &REPLAY_STYLE,
     &FRONT_STYLE,
     &REPLAY_SCRIPT,

@@ -41,7 +41,7 @@ struct SelectOption {
 #[template(path = "episodes.html")]
 struct Page {
     frame: Frame,
-    style: &'static str,
+    styles: [&'static str; 2],
     id: EvaluationId,
     team: String,
     day: Date,
@@ -151,7 +151,10 @@ pub(super) async fn page(
         .then(|| ("late".to_owned(), "a late answer".to_owned()));
     render(&Page {
         frame: Frame::load(&app, "").await?,
-        style: assets::EPISODES_STYLE.url(),
+        styles: [
+            assets::EPISODES_STYLE.url(),
+            assets::EPISODE_LIST_STYLE.url(),
+        ],
         id,
         team: team.name.to_string(),
         day: clips.evaluation.stage_day.date,
