@@ -2,7 +2,7 @@
 
 use crate::pixels::{Picture, PictureError};
 use gif::{Encoder, Frame, Repeat};
-use std::{collections::HashMap, io::Write};
+use std::{collections::HashMap, io::Write, iter};
 
 /// Time of a frame, in hundredths of a second, which are the units of GIF: 25 frames per second.
 pub const FRAME_TIME_CS: u16 = 4;
@@ -10,8 +10,8 @@ pub const FRAME_TIME_CS: u16 = 4;
 /// Red, green, blue.
 type Colour = [u8; 3];
 
-/// Largest number of colours in a GIF.
-const MAX_COLOURS: usize = 256;
+/// Largest number of colours: a GIF has 256, of which one stands for unchanged pixels.
+const MAX_COLOURS: usize = 255;
 
 /// The colours of an animation: those of a drawing, and blends of each two, which its smooth edges have.
 #[derive(Debug, Clone)]
@@ -22,7 +22,7 @@ pub struct Palette {
 }
 
 impl Palette {
-    /// The palette of a drawing with these colours; with more than 22 there is no blend of some pairs.
+    /// The palette of a drawing with these colours. Many colours have few blends or none.
     #[must_use]
     pub fn new(colours: &[Colour]) -> Self {
         let mut all: Vec<Colour> = colours.iter().copied().take(MAX_COLOURS).collect();
@@ -38,6 +38,18 @@ impl Palette {
             colours: all,
             nearest: HashMap::new(),
         }
+    }
+
+    /// The index that stands for unchanged pixels.
+    fn unchanged(&self) -> u8 {
+        u8::try_from(self.colours.len()).unwrap_or(u8::MAX)
+    }
+
+    /// The colours, and one for unchanged pixels.
+    fn bytes(&self) -> Vec<u8> {
+        let mut bytes = self.colours.concat();
+        bytes.extend([0; 3]);
+        bytes
     }
 
     fn index(&mut self, colour: Colour) -> u8 {
@@ -84,8 +96,7 @@ impl<W: Write> Animation<W> {
     pub fn new(out: W, [width, height]: [u32; 2], palette: Palette) -> Result<Self, PictureError> {
         let size = u16::try_from(width).ok().zip(u16::try_from(height).ok());
         let (columns, lines) = size.ok_or(PictureError::Size { width, height })?;
-        let mut encoder =
-            Encoder::new(out, columns, lines, &palette.colours.concat()).map_err(gif_error)?;
+        let mut encoder = Encoder::new(out, columns, lines, &palette.bytes()).map_err(gif_error)?;
         encoder.set_repeat(Repeat::Infinite).map_err(gif_error)?;
         Ok(Self {
             encoder,
@@ -114,13 +125,33 @@ impl<W: Write> Animation<W> {
             true => Part::all(self.size),
             false => Part::changed(&self.shown, &indices, columns),
         };
+        // Runs of unchanged pixels take little space.
+        let unchanged = self.palette.unchanged();
+        let shown = self
+            .shown
+            .iter()
+            .copied()
+            .map(Some)
+            .chain(iter::repeat(None));
+        let written: Vec<u8> = indices
+            .iter()
+            .zip(shown)
+            .map(|(index, shown)| {
+                if shown == Some(*index) {
+                    unchanged
+                } else {
+                    *index
+                }
+            })
+            .collect();
         let frame = Frame {
             delay: FRAME_TIME_CS,
             left: part.left,
             top: part.top,
             width: part.width,
             height: part.height,
-            buffer: part.cut(&indices, columns).into(),
+            transparent: Some(unchanged),
+            buffer: part.cut(&written, columns).into(),
             ..Frame::default()
         };
         self.shown = indices;
@@ -193,7 +224,7 @@ impl Part {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::drawing::Drawing;
+    use crate::canvas::Drawing;
     use gif::DecodeOptions;
 
     const COLOURS: [Colour; 3] = [[255, 255, 255], [0, 0, 0], [200, 0, 0]];
@@ -202,6 +233,7 @@ mod tests {
     fn palette_has_colours_and_their_blends() {
         let mut palette = Palette::new(&COLOURS);
         assert_eq!(palette.colours.len(), 3 + 3 * 84);
+        assert_eq!(palette.unchanged(), 255);
         for (index, colour) in (0..).zip(COLOURS) {
             assert_eq!(palette.index(colour), index);
         }
@@ -213,7 +245,7 @@ mod tests {
                 "{found:?}"
             );
         }
-        let many: Vec<Colour> = (0..=255).map(|grey| [grey; 3]).collect();
+        let many: Vec<Colour> = (0..=u8::MAX).map(|grey| [grey; 3]).collect();
         assert_eq!(Palette::new(&many).colours.len(), MAX_COLOURS);
     }
 
@@ -232,12 +264,19 @@ mod tests {
 
         let mut decoder = DecodeOptions::new().read_info(&file[..]).unwrap();
         assert_eq!((decoder.width(), decoder.height()), (40, 20));
-        let mut parts = Vec::new();
+        let (mut parts, mut indices) = (Vec::new(), Vec::new());
         while let Some(frame) = decoder.read_next_frame().unwrap() {
             assert_eq!(frame.delay, FRAME_TIME_CS);
             parts.push([frame.left, frame.top, frame.width, frame.height]);
+            indices.push(frame.buffer.to_vec());
         }
         assert_eq!(parts, [[0, 0, 40, 20], [0, 0, 1, 1], [0, 5, 20, 10]]);
+        assert_eq!(indices[1], [255], "unchanged");
+        assert!(
+            indices[2]
+                .chunks(20)
+                .all(|line| line == [[0; 10], [2; 10]].concat())
+        );
     }
 
     #[test]

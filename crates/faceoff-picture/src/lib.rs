@@ -4,13 +4,13 @@
 //! picture is the same on each machine, and needs no fonts there. The crate knows nothing about what is drawn.
 
 mod animation;
-mod drawing;
+mod canvas;
 mod font;
 mod pixels;
 pub mod text;
 
 pub use animation::{Animation, FRAME_TIME_CS, Palette};
-pub use drawing::Drawing;
+pub use canvas::Drawing;
 pub use font::Weight;
 pub use pixels::{Picture, PictureError};
 pub use text::{Align, TextStyle};

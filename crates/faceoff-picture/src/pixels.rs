@@ -1,6 +1,6 @@
 //! Drawings as pixels, and pixels as PNG.
 
-use crate::drawing::Drawing;
+use crate::canvas::Drawing;
 use resvg::{
     tiny_skia::{Pixmap, Transform},
     usvg::{Options, Tree},
