@@ -23,7 +23,7 @@ fn episode(file: &Path, options: &[&str]) -> Output {
     let dataset = evaluated().join("out");
     let fixed = ["replay", dataset.to_str().unwrap(), "--task", "hit"];
     let fixed = [&fixed[..], &["--episode", "0", "--video"]].concat();
-    faceoff(&[&fixed, &[file.to_str().unwrap()], options].concat())
+    faceoff(&[&fixed[..], &[file.to_str().unwrap()], options].concat())
 }
 
 fn game(file: &Path, options: &[&str]) -> Output {
