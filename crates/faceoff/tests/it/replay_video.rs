@@ -241,12 +241,13 @@ fn unsuitable_film_is_refused_with_a_reason() {
     let recording = first_game();
     let recording = recording.to_str().unwrap();
     refused(&faceoff(&["replay", recording]), &["--out <FILE>"]);
-    refused(
-        &faceoff(&["replay", recording, "--out", "a.html", "--from", "1"]),
-        &["--video"],
-    );
-    refused(
-        &faceoff(&["replay", recording, "--out", "a.gif"]),
-        &["films are written by --video"],
-    );
+    for (name, options, words) in [
+        ("a.html", &["--from", "1"][..], "--out <FILE>"),
+        ("a.gif", &[], "films are written by --video"),
+    ] {
+        let file = dir.path().join(name);
+        let fixed = ["replay", recording, "--out", file.to_str().unwrap()];
+        refused(&faceoff(&[&fixed[..], options].concat()), &[words]);
+        assert!(!file.exists(), "{name}");
+    }
 }

@@ -30,13 +30,13 @@ pub struct VideoOptions {
     #[arg(long, value_name = "FILE")]
     video: Option<PathBuf>,
     /// Of a film: its first moment, in seconds since the start of the recording [default: the start]
-    #[arg(long, value_name = "SECONDS", requires = "video", value_parser = parse_seconds, conflicts_with = "rally")]
+    #[arg(long, value_name = "SECONDS", requires = "video", value_parser = parse_seconds, conflicts_with_all = ["rally", "out"])]
     from: Option<f64>,
     /// Of a film: its last moment [default: the end]
-    #[arg(long, value_name = "SECONDS", requires = "video", value_parser = parse_seconds, conflicts_with = "rally")]
+    #[arg(long, value_name = "SECONDS", requires = "video", value_parser = parse_seconds, conflicts_with_all = ["rally", "out"])]
     to: Option<f64>,
     /// Of a film: how many seconds of the recording pass in a second, 0.1 to 100 [default: 1]
-    #[arg(long, value_name = "FACTOR", requires = "video", value_parser = parse_speed)]
+    #[arg(long, value_name = "FACTOR", requires = "video", conflicts_with = "out", value_parser = parse_speed)]
     speed: Option<f64>,
 }
 
