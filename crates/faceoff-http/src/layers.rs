@@ -166,11 +166,13 @@ async fn tell_remaining_changes(mut request: Request, next: Next) -> Response {
     response
 }
 
-/// As how many requests one with this path counts. A search reads all of the documentation.
+/// As how many requests one with this path counts. A search reads all of the documentation; a picture of a card is drawn.
 fn request_cost(path: &str) -> NonZeroU32 {
     const SEARCH: NonZeroU32 = NonZeroU32::new(10).unwrap();
+    const CARD: NonZeroU32 = NonZeroU32::new(5).unwrap();
     match path {
         "/docs/search" => SEARCH,
+        _ if path.ends_with("/card.png") => CARD,
         _ => NonZeroU32::MIN,
     }
 }

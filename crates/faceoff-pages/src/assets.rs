@@ -123,6 +123,10 @@ impl Asset {
         })
     }
 
+    pub(super) fn text(&self) -> &str {
+        self.content.text()
+    }
+
     fn response(&'static self) -> Response {
         let headers = [
             (

@@ -167,7 +167,8 @@ pub(super) async fn overall(
         frame: match query == BoardPageQuery::default() {
             true => Frame::for_app(&app, season.name, "/").located(&app, "/"),
             false => Frame::for_app(&app, season.name, "/"),
-        },
+        }
+        .with_card(&app, &card_path("/card.png", &query), card_alt(&board)),
         board_info: BoardInfo::load(&app, &board, &visibility, &address, season.paused).await?,
         days,
         conditions: common_conditions(&board.rows),
@@ -179,6 +180,24 @@ pub(super) async fn overall(
         sort,
     };
     render_with_etag(&page)
+}
+
+/// Path of the picture for cards of the board, as visitors see it.
+fn card_path(path: &str, query: &BoardPageQuery) -> String {
+    let query = BoardPageQuery {
+        live: false,
+        sort: None,
+        ..query.clone()
+    };
+    with_query(path, &query)
+}
+
+/// What the picture shows.
+fn card_alt(board: &BoardView) -> String {
+    format!(
+        "The first teams of {}: rank, score and its interval",
+        board.stage_name
+    )
 }
 
 #[derive(Template)]
@@ -246,7 +265,11 @@ pub(super) async fn by_task(
         downloads: Downloads::new(&board, &query),
         commitment: season.commitment,
         drawing: info.drawing.clone(),
-        frame: Frame::for_app(&app, season.name, path.clone()),
+        frame: Frame::for_app(&app, season.name, path.clone()).with_card(
+            &app,
+            &card_path(&format!("{path}/card.png"), &query),
+            card_alt(&board),
+        ),
         board_info: BoardInfo::load(&app, &board, &visibility, &address, season.paused).await?,
         days,
         title: info.title.clone(),

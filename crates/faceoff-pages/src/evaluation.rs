@@ -291,7 +291,15 @@ pub(super) async fn page(
         violation_headers: figures::violation_headers(app.config.competition()),
         frame: Frame::load(&app, "")
             .await?
-            .located(&app, &format!("/evaluations/{id}")),
+            .located(&app, &format!("/evaluations/{id}"))
+            .with_card(
+                &app,
+                &format!("/evaluations/{id}/card.png"),
+                format!(
+                    "{} on {}: score and success by task",
+                    view.team_name, view.day
+                ),
+            ),
         id,
         team: view.team_name.to_string(),
         agent: submission.agent_name,

@@ -12,6 +12,16 @@ use faceoff_service::{
 use faceoff_types::Ruleset;
 use std::sync::atomic::Ordering;
 
+/// The picture on cards that show a link.
+#[derive(Debug)]
+pub(super) struct CardPicture {
+    pub(super) address: String,
+    /// Text in place of the picture.
+    pub(super) alt: String,
+    /// Is it drawn for this page?
+    pub(super) is_own: bool,
+}
+
 /// Header, navigation and footer of every page.
 #[derive(Debug)]
 pub(super) struct Frame {
@@ -33,8 +43,8 @@ pub(super) struct Frame {
     pub(super) signed_in: Option<SignedIn>,
     /// What agents do in this competition; `None` on pages that are the same for all competitions.
     pub(super) subject: Option<String>,
-    /// Address of the picture on cards that show a link; `None` if the public address of the server is not configured.
-    pub(super) card_image: Option<String>,
+    /// The picture on cards that show a link; `None` if the public address of the server is not configured.
+    pub(super) card: Option<CardPicture>,
     /// The page's own address, for cards and search engines; `None` without a public address, and on pages that have several.
     pub(super) address: Option<String>,
 }
@@ -63,12 +73,34 @@ impl Frame {
             has_tournaments: app.has_tournaments.load(Ordering::Relaxed),
             ruleset: Some(app.config.competition().ruleset()),
             subject: Some(app.config.competition().subject.clone()),
-            card_image: app
-                .config
-                .public_url
-                .as_deref()
-                .map(|base| format!("{base}{}", assets::PREVIEW_PATH)),
             ..Self::new(season, current)
+        }
+        .with_preview(app)
+    }
+
+    /// With the picture of pages that have no own one.
+    fn with_preview(self, app: &AppState) -> Self {
+        let base = app.config.public_url.as_deref();
+        Self {
+            card: base.map(|base| CardPicture {
+                address: format!("{base}{}", assets::PREVIEW_PATH),
+                alt: "The board: teams with scores, tiers and intervals".to_owned(),
+                is_own: false,
+            }),
+            ..self
+        }
+    }
+
+    /// Sets the page's own picture for cards. `path`: a route of `cards.rs`; `alt`: what the picture shows.
+    pub(super) fn with_card(self, app: &AppState, path: &str, alt: String) -> Self {
+        let base = app.config.public_url.as_deref();
+        Self {
+            card: base.map(|base| CardPicture {
+                address: format!("{base}{path}"),
+                alt,
+                is_own: true,
+            }),
+            ..self
         }
     }
 
@@ -95,7 +127,7 @@ impl Frame {
             has_tournaments: false,
             signed_in: SignedIn::current(),
             subject: None,
-            card_image: None,
+            card: None,
             address: None,
         }
     }

@@ -146,7 +146,12 @@ pub(super) async fn page(
     render(&Page {
         frame: Frame::load(&app, format!("/tournaments/{}", view.tournament))
             .await?
-            .located(&app, &format!("/games/{id}")),
+            .located(&app, &format!("/games/{id}"))
+            .with_card(
+                &app,
+                &format!("/games/{id}/card.png"),
+                format!("{} against {} at the table, from above", teams[0], teams[1]),
+            ),
         id,
         tournament: view.tournament,
         tournament_name: view.tournament_name.to_string(),

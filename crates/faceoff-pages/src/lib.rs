@@ -9,6 +9,7 @@ mod assets;
 mod baselines;
 mod board;
 mod board_status;
+mod cards;
 mod chart;
 mod comparison;
 mod compressed_text;
@@ -132,6 +133,7 @@ pub fn router(app: &App, time_limit: Duration, api: Arc<Value>) -> Router<App> {
         .route("/account", get(account::page))
         .route("/join/{code}", get(join::page).post(join::submit))
         .route("/register", get(register::page).post(register::submit))
+        .merge(cards::router())
         .merge(dashboard::router())
         .merge(organiser::router())
         .route(feed::FEED_PATH, get(feed::feed))

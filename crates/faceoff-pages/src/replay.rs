@@ -73,7 +73,14 @@ pub(super) async fn page(
     let view = EpisodeReplay::load(&app, viewer?, path?).await?;
     let own_path = page_path(view.id, view.task, view.episode);
     render(&Page {
-        frame: Frame::load(&app, "").await?.located(&app, &own_path),
+        frame: Frame::load(&app, "")
+            .await?
+            .located(&app, &own_path)
+            .with_card(
+                &app,
+                &format!("{own_path}/card.png"),
+                format!("The episode from above. {}", view.replay.outcome),
+            ),
         view,
     })
 }

@@ -5,6 +5,7 @@ mod days;
 use super::{
     chart::DayChart,
     frame::{Frame, PageProblem, render},
+    query::with_query,
     submission_row::SubmissionRow,
 };
 use askama::Template;
@@ -100,7 +101,12 @@ pub(super) async fn page(
         tournaments: entered_tournaments(&app, id).await?,
         frame: Frame::load(&app, "")
             .await?
-            .located(&app, &format!("/teams/{id}")),
+            .located(&app, &format!("/teams/{id}"))
+            .with_card(
+                &app,
+                &with_query(&format!("/teams/{id}/card.png"), &query),
+                format!("{}: rank, score and success by task", team.name),
+            ),
         stage: stage.name.to_string(),
         other_stages: other_stages
             .map(|other| (other.name.to_string(), format!("?stage={}", other.id)))

@@ -62,6 +62,10 @@ pub struct AppState {
     pub(crate) game_analyses: SharedCache<String, GameAnalysis>,
     /// Highlights of evaluations by the artifact key of their clips, which never change; `None`: no success.
     pub(crate) highlights: SharedCache<String, Option<Highlight>>,
+    /// Pictures of cards that show a link, as PNG, by the hash of their drawing.
+    pub card_pictures: SharedCache<String, Vec<u8>>,
+    /// One permit: only one such picture is drawn at a time, because the slots that run evaluations and games need the CPUs.
+    pub card_permit: Semaphore,
     /// How often each team wins when a tournament is replayed with other seeds.
     pub(crate) champion_shares: TournamentAnswers<ChampionSharesView>,
     /// One permit: only one answer about a tournament is computed at a time, because the slots that run evaluations and games
@@ -104,6 +108,9 @@ const MAX_HIGHLIGHTS: u64 = 20;
 /// some hundred.
 const MAX_ANALYSIS_BYTES: u64 = 16 << 20;
 
+/// Size of the pictures of cards in memory; each has some 50 kilobytes.
+const MAX_CARD_BYTES: u64 = 8 << 20;
+
 /// A number of pending decisions by the number of changes of the season and the current minute: stages close without a change.
 pub type PendingDecisionsCache = SharedCache<(u64, i64), usize>;
 
@@ -128,6 +135,8 @@ impl AppState {
             ratings: SharedCache::with_entries(MAX_TOURNAMENTS),
             game_analyses: SharedCache::with_bytes(MAX_ANALYSIS_BYTES, GameAnalysis::memory_bytes),
             highlights: SharedCache::with_entries(MAX_HIGHLIGHTS),
+            card_pictures: SharedCache::with_bytes(MAX_CARD_BYTES, Vec::len),
+            card_permit: Semaphore::new(1),
             champion_shares: SharedCache::with_entries(MAX_TOURNAMENTS),
             tournament_computation: Semaphore::new(1),
             has_tournaments: AtomicBool::new(false),

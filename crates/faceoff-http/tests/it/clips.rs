@@ -22,14 +22,14 @@ const EPISODES: u32 = 5;
 const AGENT_OUTPUT: &str = "private output of the agent";
 
 /// A day of two teams, of which Alpha's evaluation has clips.
-struct RecordedDay {
-    site: Site,
-    alpha: TestTeam,
+pub(crate) struct RecordedDay {
+    pub(crate) site: Site,
+    pub(crate) alpha: TestTeam,
     beta: TestTeam,
     /// Path of Alpha's evaluation in the API.
     path: String,
     /// Path of the page that lists the evaluation's episodes.
-    page: String,
+    pub(crate) page: String,
 }
 
 /// Records the clips of a short evaluation. Returns the file that joins them.
@@ -82,7 +82,7 @@ pub(crate) fn record_clips(folder: &std::path::Path) -> PathBuf {
 }
 
 /// A day of two teams. The first evaluation has clips; the second one is still open unless `is_over`.
-async fn record_day(is_over: bool) -> RecordedDay {
+pub(crate) async fn record_day(is_over: bool) -> RecordedDay {
     record_day_on(Site::start().await, is_over).await
 }
 

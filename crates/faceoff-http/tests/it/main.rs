@@ -15,6 +15,7 @@ mod board_pages;
 mod browser;
 mod capacity;
 mod capacity_log;
+mod cards;
 mod clips;
 mod clock;
 mod comparisons;

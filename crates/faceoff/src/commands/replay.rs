@@ -1,4 +1,4 @@
-//! `faceoff replay`: draws an episode of a dataset or a recorded game as an HTML page or an SVG picture.
+//! `faceoff replay`: draws an episode of a dataset or a recorded game as an HTML page, an SVG picture, or a film.
 
 mod episode;
 mod game;
@@ -9,17 +9,19 @@ mod plots;
 mod recording;
 mod table_parts;
 mod table_view;
+mod video;
 
 use crate::competition::parse_task;
 use anyhow::bail;
 use clap::Args;
 use faceoff_types::Task;
 use input::Input;
-use output::{Format, Output};
+use output::Output;
 use std::path::PathBuf;
+use video::VideoOptions;
 
-/// Draws a recorded game, or one episode of a dataset, as a page (.html), which is animated and needs no network, or as a
-/// picture (.svg). A game: the table from above, goals, fouls and faults as links into the replay, and the causes of penalty
+/// Draws a recorded game, or one episode of a dataset, as a page (.html), which is animated and needs no network, as a
+/// picture (.svg), or as a film (--video). A game: the table from above, goals, fouls and faults as links into the replay, and the causes of penalty
 /// points. An episode: the table, true and observed puck, speeds, constraints, computation times, and the reason of its end.
 #[derive(Debug, Args)]
 pub struct ReplayCommand {
@@ -35,12 +37,20 @@ pub struct ReplayCommand {
     /// Of the folder of a series: the game, from 1 in the order of play
     #[arg(long, value_name = "N", conflicts_with = "task")]
     game: Option<u32>,
-    /// Of a game: the rally, from 0, that a picture shows and at which a page begins [default: a picture shows the last]
+    /// Of a game: the rally, from 0, that a picture or a film shows and at which a page begins [default: a picture shows the
+    /// last, a film the whole game]
     #[arg(long, value_name = "N", conflicts_with = "task")]
     rally: Option<u32>,
     /// The file to write, a page (.html) or a picture (.svg); an existing file is replaced
-    #[arg(long, value_name = "FILE")]
-    out: PathBuf,
+    #[arg(
+        long,
+        value_name = "FILE",
+        required_unless_present = "video",
+        conflicts_with = "video"
+    )]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    video: VideoOptions,
     /// Print the reason of the episode's end, or the result and the events of the game, as JSON
     #[arg(long)]
     json: bool,
@@ -52,11 +62,7 @@ impl ReplayCommand {
     /// # Errors
     /// If the recording cannot be read or lacks the episode or rally, the options do not fit it, or the file cannot be written.
     pub fn run(self) -> anyhow::Result<()> {
-        let output = Output {
-            format: Format::of(&self.out)?,
-            file: self.out,
-            json: self.json,
-        };
+        let output = Output::new(self.out, &self.video, self.json)?;
         let episode = self.task.zip(self.episode);
         match Input::find(&self.recording, self.game, episode.is_some())? {
             Input::Game(path) => {

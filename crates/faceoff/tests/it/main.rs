@@ -12,4 +12,5 @@ mod play;
 mod program;
 mod replay;
 mod replay_game;
+mod replay_video;
 mod sim;

@@ -10,7 +10,7 @@ use std::{
 use tempfile::TempDir;
 
 /// An evaluation with two episodes per task, of an agent that violates limits and whose name must be escaped.
-fn evaluated() -> &'static Path {
+pub fn evaluated() -> &'static Path {
     static DIR: OnceLock<TempDir> = OnceLock::new();
     let dir = DIR.get_or_init(|| {
         let dir = tempfile::tempdir().unwrap();

@@ -29,7 +29,7 @@ fn series() -> &'static Path {
     dir.path()
 }
 
-fn first_game() -> PathBuf {
+pub fn first_game() -> PathBuf {
     series().join("game-1")
 }
 

@@ -2,8 +2,9 @@
 
 use super::cup::{TestTournament, first_by_name_wins};
 use crate::{
+    cards::Picture,
     html::{rows, texts},
-    site::string,
+    site::{ADMIN, string},
 };
 use faceoff_airhockey::Interpolation;
 use faceoff_airhockey::{RallyEntry, Response, RunningGame, SimulationSetup};
@@ -213,4 +214,62 @@ async fn game_page_shows_statistics_of_its_clips() {
         "the length by the rules, not that of the game"
     );
     assert!(texts(&hidden, "[aria-labelledby=possession]").is_empty());
+}
+
+/// The picture for cards of a game.
+async fn card(cup: &TestTournament, game: &str, cookie: Option<&str>) -> Picture {
+    let path = format!("/games/{game}/card.png");
+    let mut request = cup.site.request(reqwest::Method::GET, &path, None);
+    if let Some(cookie) = cookie {
+        request = request.header("cookie", cookie);
+    }
+    Picture::read(request.send().await.unwrap()).await
+}
+
+#[tokio::test]
+async fn game_card_shows_no_result_that_is_hidden() {
+    let cup = TestTournament::start_round_robin("at_release").await;
+    let open = string(&cup.games().await[0]["id"]);
+    let before = card(&cup, &open, None).await;
+    while let Some(game) = cup.play_next(first_by_name_wins).await {
+        add_clips(&cup, &game).await;
+    }
+    let shown = card(&cup, &open, None).await;
+    assert!(shown.png != before.png, "the result is public");
+    let hidden = card(&cup, &open, Some("spoilers=hidden")).await;
+    assert!(hidden.png == before.png, "as before the game");
+    for picture in [&shown, &hidden] {
+        assert_eq!(picture.headers["vary"], "cookie");
+    }
+    assert_ne!(shown.headers["etag"], hidden.headers["etag"]);
+    let path = format!("/games/{open}/card.png?show=result");
+    let request = cup.site.request(reqwest::Method::GET, &path, None);
+    let request = request.header("cookie", "spoilers=hidden");
+    let revealed = Picture::read(request.send().await.unwrap()).await;
+    assert!(revealed.png == shown.png);
+    // The other games have other teams.
+    let other = string(&cup.games().await[1]["id"]);
+    assert!(card(&cup, &other, None).await.png != shown.png);
+}
+
+#[tokio::test]
+async fn card_of_a_test_game_is_hidden_from_everyone() {
+    let cup = TestTournament::open(&["A", "B"], serde_json::json!({})).await;
+    let baseline = cup.site.team("Organisers").await;
+    let baseline = cup.site.valid_submission(&baseline, "baseline").await;
+    let body = serde_json::json!({ "baseline": baseline.rsplit('/').next().unwrap() });
+    cup.site
+        .patch(&cup.path, Some(ADMIN), &body)
+        .await
+        .json(200);
+    let path = format!("{}/test-games", cup.path);
+    let team = cup.token("A").to_owned();
+    let body = serde_json::json!({});
+    let created = cup.site.post(&path, Some(&team), &body).await.json(201);
+    let page = format!("/games/{}", string(&created["queued"][0]["id"]));
+    for token in [None, Some(team.as_str()), Some(ADMIN)] {
+        let card = cup.site.get(&format!("{page}/card.png"), token).await;
+        assert_eq!(card.status, 404, "a picture is the same for everyone");
+    }
+    assert_eq!(cup.site.get(&page, Some(&team)).await.status, 200);
 }

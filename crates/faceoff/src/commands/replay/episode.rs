@@ -3,7 +3,9 @@
 use super::{
     output::{Format, Output},
     page,
-    recording::EpisodeRecording,
+    recording::{EpisodeRecording, time_s},
+    table_view::target_zone,
+    video::{Sample, Scene},
 };
 use crate::commands::output::print;
 use faceoff_types::Task;
@@ -12,10 +14,14 @@ use std::path::Path;
 
 pub fn draw(dataset: &Path, task: Task, episode: u32, output: &Output) -> anyhow::Result<()> {
     let recording = EpisodeRecording::read(dataset, task, episode)?;
-    output.write(match output.format {
-        Format::Html => page::html(&recording)?,
-        Format::Svg => page::svg(&recording)?,
-    })?;
+    match &output.format {
+        Format::Html => output.write(page::html(&recording)?)?,
+        Format::Svg => output.write(page::svg(&recording)?)?,
+        Format::Video(video) => {
+            let scene = scene(&recording);
+            video.write(&scene, scene.whole(), &output.file)?;
+        }
+    }
     let losses = recording.losses();
     let summary = json!({
         "episode": recording.headline(),
@@ -33,4 +39,31 @@ pub fn draw(dataset: &Path, task: Task, episode: u32, output: &Output) -> anyhow
             .collect();
         lines.join("\n")
     })
+}
+
+/// The episode as a film shows it.
+fn scene(recording: &EpisodeRecording) -> Scene {
+    // The opponent is recorded from the first step on.
+    let opponent = recording.opponent.first().into_iter();
+    let mut opponent = opponent.chain(&recording.opponent).copied();
+    let positions = recording.puck.iter().zip(&recording.mallet);
+    let samples: Vec<Sample> = positions
+        .map(|([x, y, _], mallet)| Sample {
+            puck: [*x, *y],
+            mallets: [Some(*mallet), opponent.next()],
+        })
+        .collect();
+    let outcome = &recording.outcome;
+    let title = format!(
+        "{}, episode {} of {}",
+        outcome.task, outcome.episode, recording.agent
+    );
+    let last = samples.len().saturating_sub(1);
+    Scene {
+        ground: target_zone(outcome.task),
+        captions: vec![(0, title), (last, recording.headline())],
+        starts: vec![0],
+        clock: |step| format!("{:.2} s", time_s(step)),
+        samples,
+    }
 }

@@ -8,7 +8,10 @@ mod penalties;
 mod recording;
 mod table;
 
-use super::output::{Format, Output};
+use super::{
+    output::{Format, Output},
+    video::{Sample, Scene},
+};
 use crate::commands::output::print;
 use recording::RecordedGame;
 use serde_json::json;
@@ -18,10 +21,17 @@ use std::path::Path;
 pub fn draw(path: &Path, rally: Option<u32>, output: &Output) -> anyhow::Result<()> {
     let game = RecordedGame::read(path)?;
     let chosen = rally.map(|number| game.rally(number)).transpose()?;
-    output.write(match output.format {
-        Format::Html => page::html(&game, chosen)?,
-        Format::Svg => page::svg(&game, chosen)?,
-    })?;
+    match &output.format {
+        Format::Html => output.write(page::html(&game, chosen)?)?,
+        Format::Svg => output.write(page::svg(&game, chosen)?)?,
+        Format::Video(video) => {
+            let scene = scene(&game);
+            let span = chosen.map_or(scene.whole(), |rally| {
+                [page::first_sample(rally), rally.end_step()].map(|sample| sample as usize)
+            });
+            video.write(&scene, span, &output.file)?;
+        }
+    }
     let events = events::list(&game);
     let score = &game.course.score;
     let summary = json!({
@@ -58,4 +68,31 @@ pub fn draw(path: &Path, rally: Option<u32>, output: &Output) -> anyhow::Result<
         lines.push(output.file.display().to_string());
         lines.join("\n")
     })
+}
+
+/// The game as a film shows it.
+fn scene(game: &RecordedGame) -> Scene {
+    let [home, away] = &game.agents;
+    let mut captions = vec![(0, format!("{home} 0 : 0 {away}"))];
+    captions.extend(game.course.rallies.iter().map(|rally| {
+        let [first, second] = rally.score;
+        (
+            rally.end_step() as usize,
+            format!("{home} {first} : {second} {away}"),
+        )
+    }));
+    let samples = game.samples.iter().map(|positions| Sample {
+        puck: positions.puck,
+        mallets: positions.mallets.map(Some),
+    });
+    let rallies = game.course.rallies.iter();
+    Scene {
+        ground: String::new(),
+        captions,
+        starts: rallies
+            .map(|rally| page::first_sample(rally) as usize)
+            .collect(),
+        clock: |step| clock::text(u32::try_from(step).unwrap_or(u32::MAX)),
+        samples: samples.collect(),
+    }
 }

@@ -2,7 +2,7 @@
 
 use super::{
     recording::{CONSTRAINTS, EpisodeRecording},
-    table_parts::{self, disc, path},
+    table_parts::{self, DISC_COLOURS, PATH_COLOURS, TABLE_COLOURS, disc, path},
 };
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
@@ -18,13 +18,15 @@ pub fn svg(recording: &EpisodeRecording, width_px: u32, attributes: &str) -> Str
     let mut out = table_parts::begin(width_px, attributes);
     out += &target_zone(recording.outcome.task);
     let puck: Vec<[f64; 2]> = recording.puck.iter().map(|[x, y, _]| [*x, *y]).collect();
+    let [mallet_path, opponent_path, puck_path] = PATH_COLOURS;
+    let [mallet_disc, opponent_disc, puck_disc] = DISC_COLOURS;
     out += &path(
         &recording.opponent,
-        "#b98a3a",
+        opponent_path,
         "stroke-dasharray=\"0.006 0.006\"",
     );
-    out += &path(&recording.mallet, "#2a6fb0", "");
-    out += &path(&puck, "#c0392b", "");
+    out += &path(&recording.mallet, mallet_path, "");
+    out += &path(&puck, puck_path, "");
     for [x, y] in &recording.observed_puck {
         out += &format!("<circle cx=\"{x:.4}\" cy=\"{y:.4}\" r=\"0.003\" fill=\"#888\"/>\n");
     }
@@ -44,14 +46,14 @@ pub fn svg(recording: &EpisodeRecording, width_px: u32, attributes: &str) -> Str
     let (puck_radius, mallet_radius) = (PUCK.radius_m, TOOL.cylinder_radius_m);
     if let Some([x, y, _]) = recording.puck.first() {
         out += &format!(
-            "<circle cx=\"{x:.4}\" cy=\"{y:.4}\" r=\"{puck_radius}\" stroke=\"#c0392b\" stroke-dasharray=\"0.01 0.008\"/>\n"
+            "<circle cx=\"{x:.4}\" cy=\"{y:.4}\" r=\"{puck_radius}\" stroke=\"{puck_path}\" stroke-dasharray=\"0.01 0.008\"/>\n"
         );
     }
     if let Some([x, y]) = recording.opponent.last() {
-        out += &disc("opponent", *x, *y, mallet_radius, "#e8c27c");
+        out += &disc("opponent", *x, *y, mallet_radius, opponent_disc);
     }
     if let Some([x, y]) = recording.mallet.last() {
-        out += &disc("mallet", *x, *y, mallet_radius, "#7fb2e0");
+        out += &disc("mallet", *x, *y, mallet_radius, mallet_disc);
     }
     if let Some([x, y]) = recording.observed_puck.last() {
         out += &format!(
@@ -59,13 +61,13 @@ pub fn svg(recording: &EpisodeRecording, width_px: u32, attributes: &str) -> Str
         );
     }
     if let Some([x, y, _]) = recording.puck.last() {
-        out += &disc("puck", *x, *y, puck_radius, "#e06a5c");
+        out += &disc("puck", *x, *y, puck_radius, puck_disc);
     }
     out + table_parts::END
 }
 
 /// The zone in which the puck should end.
-fn target_zone(task: Task) -> String {
+pub fn target_zone(task: Task) -> String {
     let half_width = match AirHockeyTask::try_from(task) {
         Ok(AirHockeyTask::Defend) => TABLE.half_width_m(),
         Ok(AirHockeyTask::Prepare) => PLAYABLE_Y_M,
@@ -73,9 +75,10 @@ fn target_zone(task: Task) -> String {
     };
     let [from, to] = TASK_RULES.success_x_m;
     format!(
-        "<rect x=\"{from}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"#dff0dc\"><title>target zone of the puck</title></rect>\n",
+        "<rect x=\"{from}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"{}\"><title>target zone of the puck</title></rect>\n",
         -half_width,
         to - from,
-        2.0 * half_width
+        2.0 * half_width,
+        TABLE_COLOURS[4]
     )
 }

@@ -114,7 +114,7 @@ pub fn html(game: &RecordedGame, chosen: Option<&ListedRally>) -> anyhow::Result
 }
 
 /// The first sample of a rally. The one at its start is the last of the rally before.
-fn first_sample(rally: &ListedRally) -> u32 {
+pub fn first_sample(rally: &ListedRally) -> u32 {
     match rally.game_step {
         0 => 0,
         step => step + 1,

@@ -1,15 +1,11 @@
 //! The picture of the table from above, with the paths of puck and mallets in a rally.
 
 use super::{
-    super::table_parts::{self, disc, path},
+    super::table_parts::{self, DISC_COLOURS, PATH_COLOURS, disc, path},
     recording::RecordedGame,
 };
 use faceoff_dataset::game::ListedRally;
 use faceoff_sim::{model::TOOL, table::geometry::PUCK};
-
-/// The colours of paths and discs: of the first side, the second, and the puck. Those of an episode.
-const PATHS: [&str; 3] = ["#2a6fb0", "#b98a3a", "#c0392b"];
-const DISCS: [&str; 3] = ["#7fb2e0", "#e8c27c", "#e06a5c"];
 
 /// The rally's paths and final positions as SVG, with the first side on the left. The script animates elements with an id.
 pub fn svg(game: &RecordedGame, rally: &ListedRally, width_px: u32, attributes: &str) -> String {
@@ -21,7 +17,7 @@ pub fn svg(game: &RecordedGame, rally: &ListedRally, width_px: u32, attributes: 
         thinned(samples.iter().map(|sample| sample.mallets[1])),
         thinned(samples.iter().map(|sample| sample.puck)),
     ];
-    for (points, colour) in bodies.iter().zip(PATHS) {
+    for (points, colour) in bodies.iter().zip(PATH_COLOURS) {
         out += &path(points, colour, "");
     }
     let [x, y] = rally.initial_puck;
@@ -29,16 +25,19 @@ pub fn svg(game: &RecordedGame, rally: &ListedRally, width_px: u32, attributes: 
     out += &format!(
         "<circle cx=\"{x:.4}\" cy=\"{y:.4}\" r=\"{puck_radius}\" stroke=\"#c0392b\" stroke-dasharray=\"0.01 0.008\"/>\n</g>\n"
     );
-    for (name, colour) in ["trail-1", "trail-2", "trail-puck"].into_iter().zip(PATHS) {
+    for (name, colour) in ["trail-1", "trail-2", "trail-puck"]
+        .into_iter()
+        .zip(PATH_COLOURS)
+    {
         out += &format!("<polyline id=\"{name}\" stroke=\"{colour}\" points=\"\"/>\n");
     }
     if let Some(last) = samples.last() {
         for (side, id) in ["mallet-1", "mallet-2"].into_iter().enumerate() {
             let [x, y] = last.mallets[side];
-            out += &disc(id, x, y, mallet_radius, DISCS[side]);
+            out += &disc(id, x, y, mallet_radius, DISC_COLOURS[side]);
         }
         let [x, y] = last.puck;
-        out += &disc("puck", x, y, puck_radius, DISCS[2]);
+        out += &disc("puck", x, y, puck_radius, DISC_COLOURS[2]);
     }
     out + table_parts::END
 }

@@ -1,0 +1,28 @@
+//! Pictures for cards that show a link, such as in a chat: `card.png` below the path of a page. They are public and the same for
+//! everyone: a picture shows what a visitor without an account sees on the page.
+
+mod board;
+mod episode;
+mod evaluation;
+mod game;
+mod layout;
+mod response;
+mod still;
+mod style;
+mod team;
+
+use axum::{Router, routing::get};
+use faceoff_service::app::App;
+
+pub(super) fn router() -> Router<App> {
+    Router::new()
+        .route("/card.png", get(board::overall))
+        .route("/tasks/{task}/card.png", get(board::by_task))
+        .route("/teams/{id}/card.png", get(team::picture))
+        .route("/evaluations/{id}/card.png", get(evaluation::picture))
+        .route(
+            "/evaluations/{id}/episodes/{task}/{episode}/card.png",
+            get(episode::picture),
+        )
+        .route("/games/{id}/card.png", get(game::picture))
+}
