@@ -116,10 +116,18 @@ impl<W: Write> Animation<W> {
             return Err(PictureError::Size { width, height });
         }
         let rgb = picture.rgb();
+        // Most pixels have the colour of the one before.
+        let mut last = None;
+        let mut index = |colour: Colour| match last {
+            Some((same, index)) if same == colour => index,
+            _ => {
+                let index = self.palette.index(colour);
+                last = Some((colour, index));
+                index
+            }
+        };
         let colours = rgb.chunks_exact(3);
-        let indices: Vec<u8> = colours
-            .map(|rgb| self.palette.index([rgb[0], rgb[1], rgb[2]]))
-            .collect();
+        let indices: Vec<u8> = colours.map(|rgb| index([rgb[0], rgb[1], rgb[2]])).collect();
         let columns = usize::from(self.size[0]);
         let part = match self.shown.is_empty() {
             true => Part::all(self.size),
