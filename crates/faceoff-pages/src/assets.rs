@@ -79,6 +79,11 @@ pub(super) static FRONT_STYLE: Asset = Asset::new(
     CSS,
     compressed_text!("web/static/front.css"),
 );
+pub(super) static TASK_BOARD_STYLE: Asset = Asset::new(
+    "/static/task-board.css",
+    CSS,
+    compressed_text!("web/static/task-board.css"),
+);
 /// Built from `web/client` by `make web`.
 pub(super) static REPLAY_SCRIPT: Asset = Asset::new(
     "/static/replay.js",
@@ -86,7 +91,7 @@ pub(super) static REPLAY_SCRIPT: Asset = Asset::new(
     compressed_text!("web/client/dist/replay.js"),
 );
 
-static ALL: [&Asset; 12] = [
+static ALL: [&Asset; 13] = [
     &STYLE,
     &SCRIPT,
     &ICON,
@@ -98,6 +103,7 @@ static ALL: [&Asset; 12] = [
     &EPISODE_LIST_STYLE,
     &REPLAY_STYLE,
     &FRONT_STYLE,
+    &TASK_BOARD_STYLE,
     &REPLAY_SCRIPT,
 ];
 

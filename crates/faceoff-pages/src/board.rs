@@ -213,7 +213,7 @@ struct TaskPage {
     /// Elements of an SVG drawing; empty without one.
     drawing: String,
     commitment: String,
-    style: &'static str,
+    styles: [&'static str; 2],
     course: Option<TeamsChart>,
     downloads: Downloads,
     /// Profile, episodes and rules of all rows; `None` if rows differ.
@@ -260,7 +260,7 @@ pub(super) async fn by_task(
     let previous = timeline.previous_board.as_ref();
     let context = Context::new(&board, previous, &course, sort.is_by_rank());
     render_with_etag(&TaskPage {
-        style: assets::FRONT_STYLE.url(),
+        styles: [assets::FRONT_STYLE.url(), assets::TASK_BOARD_STYLE.url()],
         course: course.chart(&board),
         downloads: Downloads::new(&board, &query),
         commitment: season.commitment,
