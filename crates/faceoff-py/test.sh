@@ -66,8 +66,11 @@ case ${1:-} in
             "$interpreter" -m venv "$target/python-version"
             # Of the libraries, those that have a wheel for this version; tests of the others are skipped.
             sed 's/ *#.*//' "$here/requirements-test.txt" | while read -r requirement; do
+                log=$target/python-version/$requirement.log
                 "$target/python-version/bin/python" -m pip install --quiet --disable-pip-version-check --no-compile \
-                    "$requirement" > "$target/python-version/log" 2>&1 || echo "not installed: $requirement"
+                    --only-binary :all: "$requirement" > "$log" 2>&1 && continue
+                grep -q 'No matching distribution found' "$log" || { cat "$log" >&2; exit 1; }
+                echo "no wheel for this version of Python: $requirement"
             done
             "$target/python-version/bin/python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps \
                 "${WHEELS:-$target/wheels}"/*.whl

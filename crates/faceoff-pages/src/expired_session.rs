@@ -17,8 +17,9 @@ use axum::{
 use faceoff_service::{
     app::App,
     problem::{Problem, ProblemKind},
-    session,
+    session, timeouts,
 };
+use std::time::Duration;
 
 fn is_text_form(headers: &HeaderMap) -> bool {
     let media_type = headers.get(header::CONTENT_TYPE);
@@ -28,7 +29,11 @@ fn is_text_form(headers: &HeaderMap) -> bool {
 
 /// Answers a dashboard's form without a valid session with the sign-in page, and a form that failed by a fault of the server with a page of
 /// that problem. Both keep the form. Forms of other sites are not kept, and neither are files.
-pub(super) async fn keep_form(State(app): State<App>, request: Request, next: Next) -> Response {
+pub(super) async fn keep_form(
+    State((app, time_limit)): State<(App, Duration)>,
+    request: Request,
+    next: Next,
+) -> Response {
     let headers = request.headers();
     let path = form_path(request.uri().path()).map(str::to_owned);
     let is_keepable = !request.method().is_safe()
@@ -40,9 +45,11 @@ pub(super) async fn keep_form(State(app): State<App>, request: Request, next: Ne
     };
     let (parts, body) = request.into_parts();
     let request = Request::from_parts(parts.clone(), body);
-    let body = match RawForm::from_request(request, &()).await {
-        Ok(RawForm(body)) => body,
-        Err(rejection) => {
+    let read = tokio::time::timeout(time_limit, RawForm::from_request(request, &()));
+    let body = match read.await {
+        Ok(Ok(RawForm(body))) => body,
+        Err(_) => return PageProblem(timeouts::problem(time_limit)).into_response(),
+        Ok(Err(rejection)) => {
             let detail = format!("the form is malformed: {}", rejection.body_text());
             let problem = Problem::new(ProblemKind::InvalidRequest, detail);
             return PageProblem::from(problem).into_response();
@@ -63,8 +70,12 @@ pub(super) async fn keep_form(State(app): State<App>, request: Request, next: Ne
     }
     let request = Request::from_parts(parts, Body::from(body.clone()));
     let response = next.run(request).await;
-    let problem = response.extensions().get::<ServerFault>().cloned();
-    match problem.zip(form()) {
+    let fault = match response.extensions().get::<ServerFault>() {
+        Some(fault) => Some(fault.clone()),
+        None => (response.status() == StatusCode::SERVICE_UNAVAILABLE)
+            .then(|| ServerFault::of(&timeouts::problem(time_limit))),
+    };
+    match fault.zip(form()) {
         Some((fault, form)) => kept_form::page_after_fault(&app, form, fault, response),
         None => response,
     }

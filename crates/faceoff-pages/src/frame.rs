@@ -193,6 +193,15 @@ pub(super) struct ServerFault {
     pub(super) detail: String,
 }
 
+impl ServerFault {
+    pub(super) fn of(problem: &Problem) -> Self {
+        Self {
+            title: problem.kind().title(),
+            detail: problem.detail().to_owned(),
+        }
+    }
+}
+
 /// A problem, shown as a page.
 pub(super) struct PageProblem(pub(super) Problem);
 
@@ -227,10 +236,7 @@ impl IntoResponse for PageProblem {
                     .headers_mut()
                     .extend(self.0.headers().iter().cloned());
                 if kind.status().is_server_error() {
-                    response.extensions_mut().insert(ServerFault {
-                        title: kind.title(),
-                        detail: self.0.detail().to_owned(),
-                    });
+                    response.extensions_mut().insert(ServerFault::of(&self.0));
                 }
                 response
             }

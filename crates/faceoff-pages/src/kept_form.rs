@@ -7,7 +7,10 @@ use crate::{
     page_auth::form_path,
 };
 use askama::Template;
-use axum::response::{Html, IntoResponse, Response};
+use axum::{
+    http::header,
+    response::{Html, IntoResponse, Response},
+};
 use faceoff_service::app::App;
 use uuid::Uuid;
 
@@ -114,7 +117,7 @@ pub(super) async fn page(app: &App, form: KeptForm) -> Result<Response, PageProb
     })
 }
 
-/// The page of a fault of the server, from which the user can send the form again. It has the status of `response`, which
+/// The page of a fault of the server, from which the user can send the form again. It has status and headers of `response`, which
 /// showed the fault alone. Nothing of it is read from the database, which may be what failed.
 pub(super) fn page_after_fault(
     app: &App,
@@ -128,7 +131,12 @@ pub(super) fn page_after_fault(
         fault: Some(fault),
     };
     match page.render() {
-        Ok(html) => (response.status(), Html(html)).into_response(),
+        Ok(html) => {
+            let (mut parts, _) = response.into_parts();
+            parts.headers.remove(header::CONTENT_LENGTH);
+            parts.headers.remove(header::CONTENT_TYPE);
+            (parts.status, parts.headers, Html(html)).into_response()
+        }
         Err(_) => response,
     }
 }

@@ -57,7 +57,7 @@ mod tournament_text;
 mod tournaments;
 mod violation_map;
 
-pub use embeddable::Embeddable;
+pub use embeddable::{Embeddable, StyledPicture};
 pub use not_found::{method_not_allowed, path_not_found, problem_response};
 pub use signed_in::identify_viewer;
 pub use spoilers::SPOILERS_PATH;
@@ -141,12 +141,13 @@ pub fn router(app: &App, time_limit: Duration, api: Arc<Value>) -> Router<App> {
         .merge(docs::router(api))
         .merge(assets::router())
         .layer(middleware::from_fn_with_state(
-            Arc::clone(app),
-            expired_session::keep_form,
-        ))
-        .layer(middleware::from_fn_with_state(
             time_limit,
             timeouts::time_out,
+        ))
+        // Around the time limit: a form is kept after that, too.
+        .layer(middleware::from_fn_with_state(
+            (Arc::clone(app), time_limit),
+            expired_session::keep_form,
         ))
         .layer(DefaultBodyLimit::max(MAX_JSON_BYTES))
         // Uploads have no fixed timeout: the receiver checks their least data rate.

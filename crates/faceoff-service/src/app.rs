@@ -65,7 +65,9 @@ pub struct AppState {
     /// Pictures of cards that show a link, as PNG, by the hash of their drawing.
     pub card_pictures: SharedCache<String, Vec<u8>>,
     /// One permit: only one such picture is drawn at a time, because the slots that run evaluations and games need the CPUs.
-    pub card_permit: Semaphore,
+    pub card_permit: Arc<Semaphore>,
+    /// A permit for each request that draws such a picture or waits for that; further ones are refused.
+    pub card_places: Arc<Semaphore>,
     /// How often each team wins when a tournament is replayed with other seeds.
     pub(crate) champion_shares: TournamentAnswers<ChampionSharesView>,
     /// One permit: only one answer about a tournament is computed at a time, because the slots that run evaluations and games
@@ -110,6 +112,8 @@ const MAX_ANALYSIS_BYTES: u64 = 16 << 20;
 
 /// Size of the pictures of cards in memory; each has some 50 kilobytes.
 const MAX_CARD_BYTES: u64 = 8 << 20;
+/// Requests that draw a picture of a card or wait for that at the same time.
+const MAX_WAITING_CARDS: usize = 16;
 
 /// A number of pending decisions by the number of changes of the season and the current minute: stages close without a change.
 pub type PendingDecisionsCache = SharedCache<(u64, i64), usize>;
@@ -136,7 +140,8 @@ impl AppState {
             game_analyses: SharedCache::with_bytes(MAX_ANALYSIS_BYTES, GameAnalysis::memory_bytes),
             highlights: SharedCache::with_entries(MAX_HIGHLIGHTS),
             card_pictures: SharedCache::with_bytes(MAX_CARD_BYTES, Vec::len),
-            card_permit: Semaphore::new(1),
+            card_permit: Arc::new(Semaphore::new(1)),
+            card_places: Arc::new(Semaphore::new(MAX_WAITING_CARDS)),
             champion_shares: SharedCache::with_entries(MAX_TOURNAMENTS),
             tournament_computation: Semaphore::new(1),
             has_tournaments: AtomicBool::new(false),

@@ -16,13 +16,14 @@ use std::time::Duration;
 pub async fn time_out(State(timeout): State<Duration>, request: Request, next: Next) -> Response {
     match tokio::time::timeout(timeout, next.run(request)).await {
         Ok(response) => response,
-        Err(_) => Problem::new(
-            ProblemKind::Busy,
-            format!(
-                "the response took longer than {} s; try again later",
-                timeout.as_secs_f64()
-            ),
-        )
-        .into_response(),
+        Err(_) => problem(timeout).into_response(),
     }
+}
+
+/// The problem of a request that took longer than `timeout`.
+#[must_use]
+pub fn problem(timeout: Duration) -> Problem {
+    let seconds = timeout.as_secs_f64();
+    let detail = format!("the response took longer than {seconds} s; try again later");
+    Problem::new(ProblemKind::Busy, detail)
 }

@@ -306,6 +306,9 @@ async fn list_shows_stills_that_browsers_keep() {
         assert_eq!(caching, "private, max-age=31536000, immutable");
         assert!(picture.body.contains("class=\"trajectory puck\" d=\"M"));
         assert!(picture.body.len() < 8_000, "{}", picture.body.len());
+        // Firefox applies the policy of a picture's own response to its styles.
+        let policy = picture.header("content-security-policy");
+        assert!(policy.contains("style-src 'unsafe-inline'"), "{policy}");
         // What the agent observed is not public.
         let own = day.site.get(address, Some(&day.alpha.token)).await;
         assert_eq!(own.body, picture.body);

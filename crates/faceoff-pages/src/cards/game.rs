@@ -19,13 +19,13 @@ use axum::{
 use faceoff_api::views::game::{GameResultView, GameStatus, GameView};
 use faceoff_picture::{Align, Weight};
 use faceoff_replay::{
-    CHUNK_STEPS, Clip, ClipKey, GameAnalysis,
+    CHUNK_STEPS, Clip, ClipKey, GOAL_PATH_STEPS, GameAnalysis,
     model::{PUCK, TOOL},
 };
 use faceoff_service::{
     app::App,
     extract::PathParam,
-    problem::Problem,
+    problem::{Problem, ProblemKind},
     request_preconditions::RequestPreconditions,
     viewer::Viewer,
     views::{game, game_clips::GameClips},
@@ -40,8 +40,6 @@ const DRAWING: Place = Place {
 };
 /// Baseline of names and score.
 const SCORE_LINE: f64 = 196.0;
-/// Samples of the drawn paths: two seconds.
-const PATH_SAMPLES: usize = 100;
 
 /// A visitor who hides results gets a picture without them.
 pub(super) async fn picture(
@@ -115,8 +113,10 @@ struct Scene {
 impl Scene {
     /// The first goal, or the end of a game without goals; `None` without a stored replay.
     async fn find(app: &App, id: GameId, result: &GameResultView) -> Result<Option<Self>, Problem> {
-        let Ok(clips) = GameClips::find(app, Viewer::Visitor, id).await else {
-            return Ok(None);
+        let clips = match GameClips::find(app, Viewer::Visitor, id).await {
+            Ok(clips) => clips,
+            Err(problem) if problem.kind() == ProblemKind::Conflict => return Ok(None),
+            Err(problem) => return Err(problem),
         };
         let analysis = clips.analysis(app, result.steps).await?;
         let last = last_sample(&analysis, result.steps);
@@ -139,7 +139,7 @@ impl Scene {
             .max()
             .map_or(0, |end| index(end) + 1);
         let end = index(last) + 1;
-        let start = rally_start.max(end.saturating_sub(PATH_SAMPLES + 1));
+        let start = rally_start.max(end.saturating_sub(GOAL_PATH_STEPS + 1));
         let part = |positions: Vec<[f64; 2]>| {
             let to = end.min(positions.len());
             positions[start.min(to)..to].to_vec()

@@ -77,10 +77,8 @@ impl Card {
         width: f64,
         align: Align,
     ) {
-        if is_legible(text) {
-            let text = style.truncated(text, width);
-            self.drawing.text(&text, style, position, align);
-        }
+        let text = style.truncated(legible(text), width);
+        self.drawing.text(&text, style, position, align);
     }
 
     /// Lines of text; returns the baseline of the next line.
@@ -91,11 +89,9 @@ impl Card {
         [x, mut y]: [f64; 2],
         (width, max_lines): (f64, usize),
     ) -> f64 {
-        if is_legible(text) {
-            for line in style.wrapped(text, width, max_lines) {
-                self.drawing.text(&line, style, [x, y], Align::Left);
-                y += 1.25 * style.size_px;
-            }
+        for line in style.wrapped(legible(text), width, max_lines) {
+            self.drawing.text(&line, style, [x, y], Align::Left);
+            y += 1.25 * style.size_px;
         }
         y
     }
@@ -186,6 +182,14 @@ impl Card {
             "range",
         );
         vertical(at(share.percent), 6.0, thickness + 8.0, "ink");
+    }
+}
+
+/// The text, or a replacement if the fonts have none of its characters.
+fn legible(text: &str) -> &str {
+    match is_legible(text) {
+        true => text,
+        false => "(name in another script)",
     }
 }
 

@@ -1,15 +1,16 @@
 //! Responses with the picture of a card.
 
 use super::layout::Card;
-use crate::frame::PageProblem;
+use crate::{embeddable::Embeddable, frame::PageProblem};
 use axum::{
+    Extension,
     http::{HeaderValue, header},
     response::{IntoResponse, Response},
 };
 use faceoff_picture::{Drawing, Picture, PictureError};
 use faceoff_service::{
     app::App,
-    problem::Problem,
+    problem::{Problem, ProblemKind},
     request_preconditions::{ETag, RequestPreconditions},
 };
 use std::sync::Arc;
@@ -35,6 +36,8 @@ pub(super) async fn respond(
             HeaderValue::from_static(CACHE_CONTROL),
         ),
     ];
+    // Chats load it from their own pages.
+    let headers = (Extension(Embeddable), headers);
     if let Some(not_modified) = preconditions.not_modified(&tag) {
         return Ok((headers, not_modified).into_response());
     }
@@ -44,9 +47,19 @@ pub(super) async fn respond(
     Ok((headers, media_type, Vec::clone(&png)).into_response())
 }
 
+/// Draws a picture on a blocking thread. The thread holds place and permit to the end, also if the client has closed the connection.
 async fn draw(app: &App, drawing: Drawing) -> Result<Arc<Vec<u8>>, Problem> {
-    let _permit = app.card_permit.acquire().await;
-    let draw = move || -> Result<Vec<u8>, PictureError> { Picture::draw(&drawing)?.png() };
+    let place = Arc::clone(&app.card_places).try_acquire_owned();
+    let place = place.map_err(|_| {
+        let detail = "too many pictures are being drawn at the moment; try again in 2 s";
+        Problem::new(ProblemKind::Busy, detail)
+    })?;
+    let permit = Arc::clone(&app.card_permit).acquire_owned().await;
+    let permit = permit.map_err(Problem::internal)?;
+    let draw = move || -> Result<Vec<u8>, PictureError> {
+        let _held = (place, permit);
+        Picture::draw(&drawing)?.png()
+    };
     let png = tokio::task::spawn_blocking(draw)
         .await
         .map_err(Problem::internal)?;

@@ -1,7 +1,11 @@
 //! Pictures of the documentation, compiled in.
 
-use crate::compressed_text::{CompressedText, compressed_text};
+use crate::{
+    compressed_text::{CompressedText, compressed_text},
+    embeddable::Embeddable,
+};
 use axum::{
+    Extension,
     http::{HeaderValue, header},
     response::{IntoResponse, Response},
 };
@@ -92,6 +96,8 @@ pub(super) async fn image(
             HeaderValue::from_static(CACHE_CONTROL),
         ),
     ];
+    // One of them is on the cards of pages without an own picture.
+    let headers = (Extension(Embeddable), headers);
     if let Some(not_modified) = conditions.not_modified(&tag) {
         return Ok((headers, not_modified).into_response());
     }

@@ -9,6 +9,11 @@ use crate::{
 use faceoff_replay::{EpisodeLine, Group};
 use faceoff_types::Task;
 
+/// Largest number of marks of a map that are links: beyond, they would overlap, and make the page large.
+const MAX_LINKS: usize = 300;
+
+const TOO_MANY_LINKS: &str = "select fewer episodes to open replays from here";
+
 /// A link to the replay of an episode, around its mark on a map.
 pub(super) struct EpisodeLink {
     /// Address relative to the page.
@@ -38,6 +43,8 @@ pub(super) struct StartMap {
     pub(super) solved_count: usize,
     pub(super) failed_count: usize,
     pub(super) links: Vec<EpisodeLink>,
+    /// Which marks are links.
+    pub(super) note: &'static str,
     /// Success rates by the position across the table and the speed of the puck at the start.
     pub(super) tables: Vec<SuccessTable>,
 }
@@ -77,7 +84,13 @@ impl StartMap {
                 .collect()
         };
         let (solved, failed) = (starts(true), starts(false));
-        let links = lines.iter().filter_map(|line| {
+        let has_all = solved.len() + failed.len() <= MAX_LINKS;
+        let has_failed = failed.len() <= MAX_LINKS;
+        let linked = lines.iter().filter(|line| match line.success {
+            true => has_all,
+            false => has_failed,
+        });
+        let links = linked.filter_map(|line| {
             let [x, y, ..] = line.start?;
             let what = match line.success {
                 true => "solved",
@@ -92,6 +105,11 @@ impl StartMap {
             solved_count: solved.len(),
             failed_count: failed.len(),
             links: links.collect(),
+            note: match (has_all, has_failed) {
+                (true, _) => "a click on a mark opens the replay",
+                (false, true) => "a click on a cross opens the replay",
+                (false, false) => TOO_MANY_LINKS,
+            },
             tables: [
                 SuccessTable {
                     id: format!("across-{task}"),
@@ -158,6 +176,8 @@ fn success_by(
 pub(super) struct ViolationMap {
     pub(super) marks: Vec<ViolationMarks>,
     pub(super) links: Vec<EpisodeLink>,
+    /// Whether marks are links.
+    pub(super) note: &'static str,
     pub(super) joints: Vec<Joint>,
     pub(super) episodes: usize,
 }
@@ -186,6 +206,14 @@ impl ViolationMap {
                 Some(EpisodeLink::new(line, violation.at?, group_label(group)))
             })
         });
+        let mut links: Vec<_> = links.take(MAX_LINKS + 1).collect();
+        let note = match links.len() {
+            0..=MAX_LINKS => "a click on a mark opens the replay",
+            _ => TOO_MANY_LINKS,
+        };
+        if links.len() > MAX_LINKS {
+            links.clear();
+        }
         let count = |group: Group, joint| {
             let matching = violations().filter(|violation| {
                 violation.group == group.name() && violation.joint == Some(joint)
@@ -202,7 +230,8 @@ impl ViolationMap {
             .collect();
         Self {
             marks,
-            links: links.collect(),
+            links,
+            note,
             joints,
             episodes: lines.iter().filter(|line| !line.broken.is_empty()).count(),
         }

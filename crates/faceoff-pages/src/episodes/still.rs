@@ -1,9 +1,12 @@
 //! `/evaluations/{id}/episodes/{task}/{episode}/still.svg`: a small still picture of an episode, for lists of episodes. It shows the public
 //! motion only, so it is the same for all viewers who may see the episode.
 
-use crate::{frame::PageProblem, replay::page_path, replay_section::Still};
+use crate::{
+    embeddable::StyledPicture, frame::PageProblem, replay::page_path, replay_section::Still,
+};
 use askama::Template;
 use axum::{
+    Extension,
     extract::{RawQuery, State},
     http::{HeaderValue, header},
     response::{IntoResponse, Response},
@@ -63,7 +66,7 @@ pub(crate) async fn picture(
                 (header::CONTENT_TYPE, media_type),
                 (header::ETAG, tag.header()),
             ];
-            (headers, svg).into_response()
+            (Extension(StyledPicture), headers, svg).into_response()
         }
     };
     // Only in the viewer's own browser: others may not be allowed to see the episode.
@@ -76,4 +79,29 @@ pub(crate) async fn picture(
     let request_headers = HeaderValue::from_static("authorization, cookie");
     headers.insert(header::VARY, request_headers);
     Ok(response)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::assets;
+
+    #[test]
+    fn stills_have_the_colours_of_the_pages() {
+        let drawing = include_str!("../../../../web/templates/still.svg");
+        let styles: String = assets::STYLE.text().split_whitespace().collect();
+        let schemes: Vec<_> = drawing
+            .lines()
+            .filter(|line| line.contains("--ink:"))
+            .collect();
+        assert_eq!(schemes.len(), 2, "light and dark");
+        for scheme in schemes {
+            let (_, properties) = scheme.split_once("svg {").unwrap();
+            let (properties, _) = properties.split_once('}').unwrap();
+            for property in properties.split(';') {
+                let property: String = property.split_whitespace().collect();
+                let is_colour = property.starts_with("--");
+                assert!(!is_colour || styles.contains(&property), "{property}");
+            }
+        }
+    }
 }

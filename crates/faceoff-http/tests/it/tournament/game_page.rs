@@ -232,7 +232,11 @@ async fn game_card_shows_no_result_that_is_hidden() {
     let open = string(&cup.games().await[0]["id"]);
     let before = card(&cup, &open, None).await;
     while let Some(game) = cup.play_next(first_by_name_wins).await {
+        let id = game.id.to_string();
+        let without_replay = card(&cup, &id, None).await;
         add_clips(&cup, &game).await;
+        let with_replay = card(&cup, &id, None).await;
+        assert!(with_replay.png != without_replay.png, "paths of the puck");
     }
     let shown = card(&cup, &open, None).await;
     assert!(shown.png != before.png, "the result is public");
