@@ -23,11 +23,15 @@ pub fn check_next_round(number: RoundNumber, started: usize) -> Result<(), Probl
     if number.index() == started {
         return Ok(());
     }
-    Err(conflict(format!(
-        "expected the number of the next round, {}, got {number}; open the page of the tournament, which shows the rounds that have \
-         started",
-        started + 1
-    )))
+    Err(conflict(match number.index() < started {
+        true => format!(
+            "round {number} has started already; open the page of the tournament, which shows its games"
+        ),
+        false => format!(
+            "expected the number of the next round, {}, got {number}; open the page of the tournament",
+            started + 1
+        ),
+    }))
 }
 
 /// Draws and starts the next round. The store refuses the draw if another request has started the round meanwhile.
