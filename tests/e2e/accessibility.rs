@@ -133,7 +133,7 @@ fn dashboards_follow_accessibility_rules() {
         &format!("/organiser/stages/{stage}"),
         "/organiser/tournaments",
         &format!("/organiser/tournaments/{cup}"),
-        &format!("/organiser/decide/start-round/{cup}"),
+        &format!("/organiser/decide/start-round/{cup}/1"),
         "/organiser/messages",
         "/organiser/storage",
         "/organiser/workers",

@@ -5,6 +5,7 @@ mod checklist;
 mod day;
 mod decision;
 mod decision_page;
+mod form_lines;
 mod log;
 mod messages;
 mod stage;

@@ -11,14 +11,12 @@ use faceoff_service::{
     extract::{Json as Body, PathParam},
     problem::{Problem, ProblemKind},
     services::{
-        decisions::checked_reason,
         departures::{self, PlannedDeparture},
         entrants,
     },
     views::tournament,
 };
 use faceoff_types::{DepartureKind, TournamentId};
-use std::slice;
 
 /// Enters teams into a tournament.
 #[utoipa::path(
@@ -61,22 +59,7 @@ pub(crate) async fn depart(
     PathParam(id): PathParam<TournamentId>,
     Body(departure): Body<NewDeparture>,
 ) -> Result<Json<TournamentView>, Problem> {
-    let reason = checked_reason(&departure.reason)?;
-    if departure.from_round.is_some() && departure.r#as == DepartureKind::Withdrawn {
-        return Err(Problem::invalid(
-            "from_round",
-            "expected none for a withdrawal, got one; leave it out: finished rounds of a team that withdraws count",
-        ));
-    }
-    let team = entrants::find_by_names(&app, "team", slice::from_ref(&departure.team)).await?[0];
-    let planned = PlannedDeparture {
-        team,
-        kind: departure.r#as,
-        from_round: departure.from_round,
-        reason: Some(reason),
-    };
-    let (actor, confirm) = (organiser.actor(), departure.confirm.as_deref());
-    departures::leave_tournament(&app, actor, id, &planned, confirm).await?;
+    departures::leave_by_name(&app, organiser.actor(), id, &departure).await?;
     tournament::find(&app, id).await.map(Json)
 }
 

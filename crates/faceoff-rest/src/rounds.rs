@@ -30,7 +30,7 @@ pub(crate) async fn start_round(
     State(app): State<App>,
     PathParam(id): PathParam<TournamentId>,
 ) -> Result<(StatusCode, Json<RoundView>), Problem> {
-    let started = tournament_rounds::start_round(&app, organiser.actor(), id).await?;
+    let started = tournament_rounds::start_round(&app, organiser.actor(), id, None).await?;
     let state = TournamentState::find(&app, id).await?;
     tracing::info!(
         tournament = %state.tournament.name, %id, round = %started.number, "round started"

@@ -255,7 +255,9 @@ async fn authenticate(parts: &Parts, app: &App) -> Result<Option<Caller>, Proble
     // another one cannot be chosen.
     let secret_hash = hash_token(token);
     let known = parts.extensions.get::<SessionCaller>();
-    let known = known.filter(|known| known.0.secret_hash == secret_hash);
+    // The secret of a session is no API token: in the header `Authorization` it is not valid.
+    let known =
+        known.filter(|known| kind == TokenKind::Session && known.0.secret_hash == secret_hash);
     let verified = match known {
         Some(SessionCaller(caller)) => Ok(VerifiedToken {
             token: caller.token.clone(),

@@ -3,8 +3,9 @@
 use crate::{
     browser::{Browser, PASSWORD, first_text, forms, invite},
     html::{attributes, links, texts},
-    site::{ADMIN, Site, string},
+    site::{ADMIN, Answer, Site, string},
 };
+use reqwest::Method;
 use scraper::{Html, Selector};
 use serde_json::json;
 
@@ -322,6 +323,26 @@ async fn expired_session_keeps_the_typed_form() {
     let announcements = site.get("/api/v1/announcements", None).await.json(200);
     assert_eq!(announcements[0]["title"], "No day on Sunday");
     assert_eq!(announcements[0]["text"], "Line <1>\nline \"2\"");
+}
+
+#[tokio::test]
+async fn session_secret_is_no_bearer_token_of_a_page() {
+    let site = Site::start().await;
+    let role = json!({ "role": "organiser", "note": "Grace" });
+    let mut grace = Browser::join(&site, "Grace", role).await;
+    assert_eq!(grace.open("/organiser").await.status, 200);
+    let cookie = grace.cookie.clone().unwrap();
+    let (_, secret) = cookie.split_once('=').unwrap();
+    let request = site.request(Method::GET, "/organiser", Some(secret));
+    // The cookie is valid, but the header has precedence.
+    for request in [
+        request.try_clone().unwrap().header("cookie", &cookie),
+        request,
+    ] {
+        let refused = Answer::read(request.send().await.unwrap()).await;
+        let page = refused.html(401);
+        assert!(texts(&page, "main")[0].contains("session cookie"));
+    }
 }
 
 #[tokio::test]

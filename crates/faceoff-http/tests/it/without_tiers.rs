@@ -1,6 +1,7 @@
 //! Tests of a competition without tiers: boards rank by score, and neither pages nor files nor the API name a tier.
 
 use crate::{
+    browser::Browser,
     html::{page, texts},
     site::{ADMIN, Site, result},
 };
@@ -99,6 +100,14 @@ async fn stage_without_tiers_refuses_their_bounds() {
 #[tokio::test]
 async fn all_teams_qualify_without_tiers() {
     let site = site_with_results().await;
+    let role = json!({ "role": "organiser", "note": "Grace" });
+    let mut grace = Browser::join(&site, "Grace", role).await;
+    let form = grace.open("/organiser/tournaments").await.html(200);
+    let label = texts(&form, "label[for=teams]").remove(0);
+    assert!(
+        label.contains("for all ranked teams of the stage"),
+        "{label}"
+    );
     let stage = site.stage().await;
     let body = json!({ "name": "Cup", "stage": stage });
     let opened = site.post("/api/v1/tournaments", Some(ADMIN), &body).await;

@@ -16,7 +16,7 @@ use day::DayDecision;
 use evaluation::EvaluationDecision;
 use faceoff_api::requests;
 use faceoff_service::{app::AppState, auth::Organiser, problem::Problem};
-use faceoff_types::DepartureKind;
+use faceoff_types::{DepartureKind, RoundNumber};
 use game::GameDecision;
 pub(super) use preview::DecisionPreview;
 use preview::Done;
@@ -86,7 +86,12 @@ fn find(name: &str, subject: &str) -> Option<Decision> {
         "final-day" => Decision::Stage(StageDecision::FinalDay(subject.parse().ok()?)),
         "sign-off" => Decision::Stage(StageDecision::SignOff(subject.parse().ok()?)),
         "start-round" => {
-            Decision::Tournament(TournamentDecision::StartRound(subject.parse().ok()?))
+            let (tournament, number) = subject.split_once('/')?;
+            let number = RoundNumber::try_from(number.parse::<u32>().ok()?).ok()?;
+            Decision::Tournament(TournamentDecision::StartRound(
+                tournament.parse().ok()?,
+                number,
+            ))
         }
         "pause-tournament" => {
             Decision::Tournament(TournamentDecision::Pause(subject.parse().ok()?))

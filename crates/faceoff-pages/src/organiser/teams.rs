@@ -1,5 +1,6 @@
 //! `/organiser/teams`: teams, registrations and divisions.
 
+use super::form_lines;
 use crate::{
     dashboard_frame::{DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
     frame::{Frame, PageProblem},
@@ -129,12 +130,9 @@ pub(super) struct SeasonForm {
 }
 
 fn season_change(form: &SeasonForm) -> Result<SeasonChange, Problem> {
-    let names = form.divisions.lines().map(str::trim);
-    let names = names.filter(|name| !name.is_empty()).map(str::parse);
-    let divisions: Result<Vec<DivisionName>, _> = names.collect();
     Ok(SeasonChange {
         takes_registrations: Some(!form.takes_registrations.is_empty()),
-        divisions: Some(divisions.map_err(|error| Problem::invalid("divisions", error))?),
+        divisions: Some(form_lines::parse("divisions", &form.divisions)?),
     })
 }
 

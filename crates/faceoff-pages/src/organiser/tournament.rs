@@ -1,6 +1,6 @@
 //! `/organiser/tournaments/{id}`: status, games, teams and decisions of a tournament.
 
-use super::tournaments::{PATH, game_counts};
+use super::{form_lines, tournaments::PATH};
 use crate::{
     dashboard_frame::{DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
     frame::{Frame, PageProblem},
@@ -13,7 +13,7 @@ use axum::{
     extract::{Query, State},
     response::Response,
 };
-use faceoff_api::views::tournament::{TournamentPhase, TournamentView};
+use faceoff_api::views::tournament::{EntrantView, TournamentPhase, TournamentView};
 use faceoff_service::{
     app::App,
     extract::{PageForm, PathParam},
@@ -22,7 +22,7 @@ use faceoff_service::{
     viewer::Viewer,
     views::{game, tournament, tournament_state::TournamentState},
 };
-use faceoff_types::{TeamName, TournamentFormat, TournamentId};
+use faceoff_types::{DepartureKind, TeamName, TournamentFormat, TournamentId};
 use serde::Deserialize;
 
 #[derive(Template)]
@@ -44,10 +44,20 @@ struct Page {
     /// Games with a result, which can be voided. The last round first.
     with_result: Vec<GameRow>,
     is_closed: bool,
+    is_round_running: bool,
     can_start_round: bool,
     can_close: bool,
     can_enter: bool,
     form: EntrantsForm,
+}
+
+impl Page {
+    /// A team cannot avoid disqualification by withdrawing first.
+    fn can_disqualify(&self, entrant: &EntrantView) -> bool {
+        let has_started = !self.view.rounds.is_empty();
+        let departure = entrant.departure.as_ref();
+        departure.is_none_or(|departure| has_started && departure.r#as == DepartureKind::Withdrawn)
+    }
 }
 
 /// Teams to enter.
@@ -85,7 +95,7 @@ async fn page_with(
     let phase = view.head.phase;
     let can_start_round = matches!(phase, TournamentPhase::Open | TournamentPhase::Between);
     let has_groups = matches!(view.rules.format, TournamentFormat::Groups { .. });
-    let (played, games) = game_counts(&view);
+    let progress = tournament::progress(&state);
     let teams = view.entrants.iter();
     let page = Page {
         frame: Frame::load(app, "").await?,
@@ -94,11 +104,12 @@ async fn page_with(
         format: tournament_text::describe_format(&view.rules),
         last_round: view.rules.format.last_round().to_string(),
         teams: teams.filter(|team| team.departure.is_none()).count(),
-        played,
-        games,
+        played: progress.played,
+        games: progress.games - progress.cancelled,
         to_rerun: select(|state| matches!(state, GameState::Void | GameState::Failed)),
         with_result: select(|state| matches!(state, GameState::Played { .. })),
         is_closed: phase == TournamentPhase::Closed,
+        is_round_running: phase == TournamentPhase::Round,
         can_start_round,
         can_close: can_start_round || phase == TournamentPhase::Played,
         can_enter: phase == TournamentPhase::Open
@@ -127,11 +138,9 @@ pub(super) async fn enter(
     form: Result<PageForm<EntrantsForm>, Problem>,
 ) -> Result<Response, PageProblem> {
     let (PathParam(id), PageForm(form)) = (id?, form?);
-    let names = form.teams.lines().map(str::trim);
-    let names = names.filter(|name| !name.is_empty()).map(str::parse);
-    let entered = match names.collect::<Result<Vec<TeamName>, _>>() {
+    let entered = match form_lines::parse::<TeamName>("teams", &form.teams) {
         Ok(names) => entrants::enter_teams(&app, user.organiser.actor(), id, &names).await,
-        Err(error) => Err(Problem::invalid("teams", error)),
+        Err(problem) => Err(problem),
     };
     match entered {
         Ok(()) => Ok(redirect_done(&page_path(id), "teams-entered")),

@@ -1,5 +1,6 @@
 //! A form with the most important rules of a new tournament, and its conversion into a request of the API.
 
+use super::form_lines;
 use faceoff_api::requests::NewTournament;
 use faceoff_service::{app::App, problem::Problem, views::stage};
 use faceoff_types::{Publication, TeamName, TournamentFormat, TournamentSettings};
@@ -88,11 +89,7 @@ impl TournamentForm {
             }),
             kind => json!({ "kind": kind, "rounds": number("rounds", &self.rounds)? }),
         };
-        let names = self.teams.lines().map(str::trim);
-        let names = names.filter(|name| !name.is_empty()).map(str::parse);
-        let teams: Vec<TeamName> = names
-            .collect::<Result<_, _>>()
-            .map_err(|error| Problem::invalid("teams", error))?;
+        let teams: Vec<TeamName> = form_lines::parse("teams", &self.teams)?;
         let object = |fields: &[(&str, Value)]| {
             let owned = |(name, value): &(&str, Value)| ((*name).to_owned(), value.clone());
             Some(fields.iter().map(owned).collect::<Map<_, _>>())

@@ -12,7 +12,7 @@ use axum::{
     extract::{Query, State},
     response::Response,
 };
-use faceoff_api::views::tournament::{TournamentHead, TournamentView};
+use faceoff_api::views::tournament::TournamentHead;
 use faceoff_service::{
     app::App,
     extract::PageForm,
@@ -46,6 +46,8 @@ struct Page {
     head: DashboardHeader,
     /// Does the competition have games of two agents?
     has_games: bool,
+    /// Does the competition have tiers, which qualify teams?
+    has_tiers: bool,
     /// The newest first.
     rows: Vec<Row>,
     stages: Vec<StageName>,
@@ -69,36 +71,25 @@ pub(super) fn decision_text(kind: TournamentDecisionKind) -> String {
     }
 }
 
-/// Games with a result, and all games, of the started rounds.
-pub(super) fn game_counts(view: &TournamentView) -> (u32, u32) {
-    let rounds = view.rounds.iter().map(|round| &round.progress);
-    rounds.fold((0, 0), |(played, games), progress| {
-        let counting = progress.games - progress.cancelled;
-        (played + progress.played, games + counting)
-    })
-}
-
 async fn page_with(
     app: &App,
     user: &PageOrganiser,
     notice: Notice<'_>,
     form: TournamentForm,
 ) -> Result<Response, PageProblem> {
-    let decisions = pending_decisions::of_tournaments(app).await?;
     let mut rows = Vec::new();
     for tournament in app.store.tournaments().await?.into_iter().rev() {
-        let view = tournament::find(app, tournament.id).await?;
-        let (played, games) = game_counts(&view);
-        let mut pending = decisions.iter();
-        let decision = pending.find(|decision| decision.id == tournament.id);
-        let teams = view.entrants.iter();
+        let state = tournament::listed_state(app, tournament.id).await?;
+        let head = tournament::head(&state);
+        let progress = tournament::progress(&state);
+        let teams = state.entrants.iter();
         rows.push(Row {
-            phase: tournament_text::phase_label(&view.head),
+            phase: tournament_text::phase_label(&head),
             teams: teams.filter(|team| team.departure.is_none()).count(),
-            played,
-            games,
-            decision: decision.map(|decision| decision_text(decision.kind)),
-            head: view.head,
+            played: progress.played,
+            games: progress.games - progress.cancelled,
+            decision: pending_decisions::of_tournament(&state).map(decision_text),
+            head,
         });
     }
     let stages = app.store.stages().await?.into_iter();
@@ -106,6 +97,7 @@ async fn page_with(
         frame: Frame::load(app, PATH).await?,
         head: DashboardHeader::new(&user.caller, PATH, notice),
         has_games: app.config.competition().has_games,
+        has_tiers: app.config.competition().tiers.is_some(),
         rows,
         stages: stages.map(|stage| stage.name).collect(),
         form,

@@ -1,14 +1,19 @@
 //! Departures of teams from a tournament: a team withdraws, or organisers withdraw or disqualify it.
 
-use super::decisions::{Preview, checked_reason};
+use super::{
+    decisions::{Preview, checked_reason, reason_clause},
+    entrants,
+};
 use crate::{
     app::AppState,
     boxed,
     problem::{Problem, ProblemKind},
     views::tournament_state::TournamentState,
 };
+use faceoff_api::requests::NewDeparture;
 use faceoff_store::{Actor, DepartureRequest, GameState};
 use faceoff_types::{DepartureKind, RoundNumber, TeamId, TournamentId};
+use std::slice;
 
 /// Which team leaves a tournament, and how.
 #[derive(Debug, Clone, Copy)]
@@ -21,14 +26,6 @@ pub struct PlannedDeparture<'a> {
     pub reason: Option<&'a str>,
 }
 
-/// A clause for the description of effects.
-fn reason_clause(reason: Option<&str>) -> String {
-    match reason {
-        Some(reason) => format!("the reason {reason:?} would be public"),
-        None => "the reason would be public".to_owned(),
-    }
-}
-
 /// Preview of a departure.
 #[boxed]
 pub async fn preview_departure(
@@ -36,7 +33,10 @@ pub async fn preview_departure(
     id: TournamentId,
     departure: &PlannedDeparture<'_>,
 ) -> Result<Preview, Problem> {
-    let state = TournamentState::without_standings(app, id).await?;
+    preview(&TournamentState::find(app, id).await?, departure)
+}
+
+fn preview(state: &TournamentState, departure: &PlannedDeparture<'_>) -> Result<Preview, Problem> {
     let entrants = &mut state.entrants.iter();
     let Some(entrant) = entrants.find(|entrant| entrant.team == departure.team) else {
         return Err(Problem::new(
@@ -45,49 +45,40 @@ pub async fn preview_departure(
         ));
     };
     let name = entrant.name.to_string();
-    let preview = |effect| Preview { name, effect };
     let reason = reason_clause(departure.reason);
-    let team_games = state
-        .games
-        .iter()
-        .filter(|game| game.teams.contains(&departure.team));
-    let open_games = team_games.filter(|game| {
-        !matches!(
-            game.state,
-            GameState::Played(_) | GameState::Cancelled { .. }
+    let effect = if state.rounds.is_empty() {
+        format!(
+            "{name} would leave the tournament, whose first round has not started. Its unfinished test and friendly games \
+             would be cancelled. It may enter again"
         )
-    });
-    if state.rounds.is_empty() {
-        let effect = format!(
-            "{} would leave the tournament, whose first round has not started, and its unfinished test and friendly games \
-             would be cancelled; it may enter again",
-            entrant.name
-        );
-        return Ok(preview(effect));
-    }
-    if state.tournament.rules.plays_on(departure.kind) {
-        let effect = format!(
-            "{} would be withdrawn for good; its games of a running round would still be played and count, and it would not play in \
-             later rounds; its unfinished test and friendly games would be cancelled; {reason}",
-            entrant.name
-        );
-        return Ok(preview(effect));
-    }
-    let outcome = match departure.kind {
-        DepartureKind::Withdrawn => "be withdrawn",
-        DepartureKind::Disqualified => "be disqualified, and rank below all others",
+    } else if state.tournament.rules.plays_on(departure.kind) {
+        format!(
+            "{name} would be withdrawn for good, {reason}. Its games of a running round would still be played and count, and \
+             it would not play in later rounds. Its unfinished test and friendly games would be cancelled"
+        )
+    } else {
+        let (outcome, rank) = match departure.kind {
+            DepartureKind::Withdrawn => ("withdrawn", ""),
+            DepartureKind::Disqualified => ("disqualified", ", and would rank below all others"),
+        };
+        let earlier_rounds = match departure.from_round {
+            Some(round) => format!(", and of all rounds from {round} on,"),
+            None => String::new(),
+        };
+        let open_games = state.games.iter().filter(|game| {
+            game.teams.contains(&departure.team)
+                && !matches!(
+                    game.state,
+                    GameState::Played(_) | GameState::Cancelled { .. }
+                )
+        });
+        format!(
+            "{name} would be {outcome} for good, {reason}{rank}. {} of its games, and its unfinished test and friendly games, \
+             would be cancelled. Its games of the running or next round{earlier_rounds} would not count",
+            open_games.count()
+        )
     };
-    let earlier_rounds = match departure.from_round {
-        Some(round) => format!(", and of all rounds from {round} on"),
-        None => String::new(),
-    };
-    let effect = format!(
-        "{} would {outcome} for good; {} of its games, and its unfinished test and friendly games, would be cancelled; its games of \
-         the running or next round{earlier_rounds} would not count; {reason}",
-        entrant.name,
-        open_games.count()
-    );
-    Ok(preview(effect))
+    Ok(Preview { name, effect })
 }
 
 /// Lets a team leave a tournament for good, if that is confirmed with the team's name.
@@ -100,26 +91,61 @@ pub async fn leave_tournament(
     confirm: Option<&str>,
 ) -> Result<(), Problem> {
     let reason = checked_reason(departure.reason.unwrap_or_default())?;
+    let state = TournamentState::find(app, id).await?;
     let departure = PlannedDeparture {
         reason: Some(reason),
         ..*departure
     };
-    let preview = preview_departure(app, id, &departure).await?;
-    preview.check_confirmed(confirm)?;
-    let PlannedDeparture {
+    preview(&state, &departure)?.check_confirmed(confirm)?;
+    record_departure(app, actor, id, request(&departure, reason)).await
+}
+
+/// Lets the team with the name in the request leave a tournament, like [`leave_tournament`].
+#[boxed]
+pub async fn leave_by_name(
+    app: &AppState,
+    actor: Actor,
+    id: TournamentId,
+    departure: &NewDeparture,
+) -> Result<(), Problem> {
+    let reason = checked_reason(&departure.reason)?;
+    if departure.from_round.is_some() && departure.r#as == DepartureKind::Withdrawn {
+        return Err(Problem::invalid(
+            "from_round",
+            "expected none for a withdrawal, got one; leave it out: finished rounds of a team that withdraws count",
+        ));
+    }
+    let state = TournamentState::find(app, id).await?;
+    let team = entrants::find_by_names(app, "team", slice::from_ref(&departure.team)).await?[0];
+    let planned = PlannedDeparture {
         team,
-        kind,
-        from_round,
-        ..
-    } = departure;
-    let request = DepartureRequest {
-        team,
-        kind,
-        from_round,
-        reason: reason.to_owned(),
+        kind: departure.r#as,
+        from_round: departure.from_round,
+        reason: Some(reason),
     };
+    preview(&state, &planned)?.check_confirmed(departure.confirm.as_deref())?;
+    record_departure(app, actor, id, request(&planned, reason)).await
+}
+
+fn request(departure: &PlannedDeparture<'_>, reason: &str) -> DepartureRequest {
+    DepartureRequest {
+        team: departure.team,
+        kind: departure.kind,
+        from_round: departure.from_round,
+        reason: reason.to_owned(),
+    }
+}
+
+async fn record_departure(
+    app: &AppState,
+    actor: Actor,
+    id: TournamentId,
+    request: DepartureRequest,
+) -> Result<(), Problem> {
     let now = app.config.clock.now();
     app.store.leave_tournament(actor, id, &request, now).await?;
-    tracing::info!(tournament = %id, %team, left_as = ?kind, reason, "team left");
+    tracing::info!(
+        tournament = %id, team = %request.team, left_as = ?request.kind, reason = request.reason, "team left"
+    );
     Ok(())
 }

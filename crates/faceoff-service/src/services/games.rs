@@ -13,9 +13,7 @@ use faceoff_store::{Actor, Game};
 use faceoff_types::GameId;
 
 /// The names of both teams of a game, the home team first; they confirm decisions about it.
-#[boxed]
-pub async fn pairing_name(app: &AppState, game: &Game) -> Result<String, Problem> {
-    let state = TournamentState::without_standings(app, game.tournament).await?;
+pub fn pairing_name(state: &TournamentState, game: &Game) -> Result<String, Problem> {
     let [home, away] = game.teams;
     Ok(format!("{} - {}", state.name(home)?, state.name(away)?))
 }
@@ -27,8 +25,8 @@ pub async fn preview_void_game(
     id: GameId,
     reason: Option<&str>,
 ) -> Result<Preview, Problem> {
-    let (_, game) = game::find_visible(app, Viewer::Organiser, id).await?;
-    let name = pairing_name(app, &game).await?;
+    let (state, game) = game::find_visible(app, Viewer::Organiser, id).await?;
+    let name = pairing_name(&state, &game)?;
     let effect = format!(
         "the result of {name} would be voided at once, {}; the next round would wait until the game is rerun, with the same \
          seed and submissions",

@@ -9,21 +9,50 @@ use crate::{
 };
 use faceoff_scoring::tournament::schedule::{Matchday, Round};
 use faceoff_store::{Actor, DrawnMatchday, DrawnRound, TournamentRound};
-use faceoff_types::{TeamId, TeamName, TournamentId};
+use faceoff_types::{RoundNumber, TeamId, TeamName, TournamentId};
+
+fn conflict(detail: String) -> Problem {
+    Problem::new(ProblemKind::Conflict, detail)
+}
+
+/// Refuses to start a round that is not the next one after the `started` rounds.
+///
+/// # Errors
+/// `Conflict`.
+pub fn check_next_round(number: RoundNumber, started: usize) -> Result<(), Problem> {
+    if number.index() == started {
+        return Ok(());
+    }
+    Err(conflict(match number.index() < started {
+        true => format!(
+            "round {number} has started already; open the page of the tournament, which shows its games"
+        ),
+        false => format!(
+            "expected the number of the next round, {}, got {number}; open the page of the tournament",
+            started + 1
+        ),
+    }))
+}
 
 /// Draws and starts the next round. The store refuses the draw if another request has started the round meanwhile.
+///
+/// # Errors
+/// `Conflict` if the next round has not the number `expected`, or cannot start.
 #[boxed]
 pub async fn start_round(
     app: &AppState,
     actor: Actor,
     id: TournamentId,
+    expected: Option<RoundNumber>,
 ) -> Result<TournamentRound, Problem> {
     let state = TournamentState::find(app, id).await?;
-    let conflict = |detail: String| Problem::new(ProblemKind::Conflict, detail);
     if state.tournament.closed_at.is_some() {
         return Err(conflict(
             "the tournament is closed; no further round starts".to_owned(),
         ));
+    }
+    if let Some(number) = expected {
+        check_next_round(number, state.rounds.len())?;
     }
     // In a mirrored tournament each pairing is played twice with exchanged sides. The scoring would also accept one of the two
     // games, so the draw waits until both have a result.

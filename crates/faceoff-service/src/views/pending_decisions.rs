@@ -77,29 +77,33 @@ pub async fn of_tournaments(app: &AppState) -> Result<Vec<TournamentDecision>, P
             continue;
         }
         let state = TournamentState::without_standings(app, tournament.id).await?;
-        let is_void_or_failed = |state: &GameState| {
-            matches!(
-                state,
-                GameState::Void { .. } | GameState::PlatformFailed { .. }
-            )
-        };
-        let to_rerun = state
-            .games
-            .iter()
-            .filter(|game| state.needs_result(game) && is_void_or_failed(&game.state));
-        let kind = match (to_rerun.count(), tournament::phase(&state)) {
-            (0, TournamentPhase::Between) => TournamentDecisionKind::StartRound,
-            (0, TournamentPhase::Played) => TournamentDecisionKind::Close,
-            (0, _) => continue,
-            (games, _) => TournamentDecisionKind::Rerun { games },
-        };
-        decisions.push(TournamentDecision {
-            id: tournament.id,
-            name: tournament.name,
-            kind,
-        });
+        if let Some(kind) = of_tournament(&state) {
+            decisions.push(TournamentDecision {
+                id: tournament.id,
+                name: tournament.name,
+                kind,
+            });
+        }
     }
     Ok(decisions)
+}
+
+/// The pending decision about a tournament; `None` also without a started round.
+pub fn of_tournament(state: &TournamentState) -> Option<TournamentDecisionKind> {
+    let to_rerun = state.games.iter().filter(|game| {
+        let is_void_or_failed = matches!(
+            game.state,
+            GameState::Void { .. } | GameState::PlatformFailed { .. }
+        );
+        state.needs_result(game) && is_void_or_failed
+    });
+    match (tournament::phase(state), to_rerun.count()) {
+        (TournamentPhase::Closed, _) => None,
+        (_, games @ 1..) => Some(TournamentDecisionKind::Rerun { games }),
+        (TournamentPhase::Between, 0) => Some(TournamentDecisionKind::StartRound),
+        (TournamentPhase::Played, 0) => Some(TournamentDecisionKind::Close),
+        (TournamentPhase::Open | TournamentPhase::Round, 0) => None,
+    }
 }
 
 /// Evaluations of a day that have no result through no fault of the agent, and that nothing has replaced yet.

@@ -23,15 +23,39 @@ use faceoff_types::{RoundNumber, StageName, TeamId, TeamName, TournamentId};
 pub async fn heads(app: &AppState) -> Result<Vec<TournamentHead>, Problem> {
     let mut heads = Vec::new();
     for tournament in app.store.tournaments().await? {
-        let state = TournamentState::find(app, tournament.id).await?;
-        heads.push(head(&state));
+        heads.push(head(&listed_state(app, tournament.id).await?));
     }
     Ok(heads)
 }
 
-fn head(state: &TournamentState) -> TournamentHead {
-    let tables = state.tables(state.played());
+/// The state of a tournament for lists: standings are built only once they decide the champion.
+#[boxed]
+pub async fn listed_state(app: &AppState, id: TournamentId) -> Result<TournamentState, Problem> {
+    let state = TournamentState::without_standings(app, id).await?;
+    match is_decided(&state) {
+        true => state.with_standings(),
+        false => Ok(state),
+    }
+}
+
+/// The head of a tournament, whose state has standings if they decide the champion.
+pub fn head(state: &TournamentState) -> TournamentHead {
+    let tables = match is_decided(state) {
+        true => state.tables(state.played()),
+        false => Vec::new(),
+    };
     build_head(state, &tables)
+}
+
+/// The numbers of games of all started rounds.
+pub fn progress(state: &TournamentState) -> RoundProgress {
+    let mut progress = RoundProgress::default();
+    for game in &state.games {
+        if matches!(game.purpose, GamePurpose::Round(_)) {
+            count_game(&mut progress, &game.state);
+        }
+    }
+    progress
 }
 
 fn build_head(state: &TournamentState, tables: &[Table]) -> TournamentHead {
@@ -197,15 +221,19 @@ pub(super) fn first_place(table: &Table) -> Option<TeamName> {
     Some(first.team.clone())
 }
 
-/// The champion, once all rounds are over.
-fn champion(state: &TournamentState, tables: &[Table]) -> Option<TeamName> {
+/// Whether all rounds are over, so that there is a champion.
+fn is_decided(state: &TournamentState) -> bool {
     let last_round = state.tournament.rules.format.last_round();
     // An archive may contain only a part of a round that was running.
     let all_rounds_over = state.rounds.iter().all(|round| round.over_at.is_some());
-    let is_over = state.rounds.len() >= last_round.get() as usize
+    state.rounds.len() >= last_round.get() as usize
         && all_rounds_over
-        && !state.games.iter().any(|game| state.needs_result(game));
-    first_place(tables.first().filter(|_| is_over)?)
+        && !state.games.iter().any(|game| state.needs_result(game))
+}
+
+/// The champion, once all rounds are over.
+fn champion(state: &TournamentState, tables: &[Table]) -> Option<TeamName> {
+    first_place(tables.first().filter(|_| is_decided(state))?)
 }
 
 /// What happens next, in words.

@@ -41,10 +41,14 @@ impl TournamentState {
     /// The state with draws and results.
     #[boxed]
     pub async fn find(app: &AppState, id: TournamentId) -> Result<Self, Problem> {
-        let mut state = Self::without_standings(app, id).await?;
-        state.drawn = state.drawn_rounds()?;
-        state.played = state.results(&state.games)?;
-        Ok(state)
+        Self::without_standings(app, id).await?.with_standings()
+    }
+
+    /// Adds the draws and results.
+    pub(super) fn with_standings(mut self) -> Result<Self, Problem> {
+        self.drawn = self.drawn_rounds()?;
+        self.played = self.results(&self.games)?;
+        Ok(self)
     }
 
     /// The state without draws and results: enough for single games, but not for tables.

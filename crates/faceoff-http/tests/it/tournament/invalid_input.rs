@@ -152,6 +152,12 @@ async fn impossible_round_is_refused_with_the_reason() {
             .await
             .problem(422, "invalid-content", words);
     }
+    let elsewhere = format!("/api/v1/tournaments/{UNKNOWN_ID}/departures");
+    let departure = json!({ "team": "Unknown", "as": "withdrawn", "reason": "x" });
+    cup.site
+        .post(&elsewhere, Some(ADMIN), &departure)
+        .await
+        .problem(404, "not-found", &["tournament"]);
     cup.site.team("C").await;
     let not_entered = json!({ "team": "C", "as": "withdrawn", "reason": "x", "confirm": "C" });
     cup.post("departures", not_entered)

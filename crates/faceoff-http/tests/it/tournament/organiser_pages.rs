@@ -1,11 +1,11 @@
 //! Tests of the organisers' pages of tournaments: opening, running and closing one with forms alone.
 
 use super::{
-    cup::{TestTournament, first_by_name_wins},
+    cup::{TestTournament, first_by_name_wins, team_names},
     fake_worker,
 };
 use crate::{
-    browser::{Browser, forms},
+    browser::{Browser, Form, forms},
     html::{links, rows, texts},
     site::{ADMIN, Site, string},
     team_dashboard::{dashboard_page, redirect_target},
@@ -136,6 +136,11 @@ async fn tournament_is_run_with_forms_alone() {
     let row = rows(&list, "tbody tr").remove(0);
     assert!(row.contains("champion: A"), "{row}");
     assert!(row.contains("can be closed"), "{row}");
+    // The sentence about the organisers is for everyone else.
+    let pending = "the organisers still have to close the tournament";
+    let public = site.get(&page.replace("/organiser", ""), None).await;
+    assert!(public.body.contains(pending), "{}", public.body);
+    assert!(!grace.open(page).await.body.contains(pending));
     let (effects, target) = decide(&mut grace, page, "close-tournament").await;
     assert!(effects.contains("closed for good"), "{effects}");
     assert_eq!(target, format!("{page}?done=tournament-closed"));
@@ -146,9 +151,103 @@ async fn tournament_is_run_with_forms_alone() {
 }
 
 #[tokio::test]
+async fn stale_page_does_not_start_the_next_round() {
+    let cup = TestTournament::open(&["A", "B"], json!({})).await;
+    let mut grace = organiser(&cup.site, "Grace").await;
+    let page = cup.path.replace("/api/v1", "/organiser");
+    let id = cup.path.rsplit('/').next().unwrap();
+    for (number, other) in [(1, 2), (2, 1)] {
+        let path = |round: u32| format!("/organiser/decide/start-round/{id}/{round}");
+        let decision = path(number);
+        let html = dashboard_page(&grace.open(&page).await, 200);
+        assert_eq!(
+            links(&html, "main a[href*='/start-round/']"),
+            [decision.as_str()]
+        );
+        let of_other_round = grace.submit(&path(other), &[]).await;
+        assert_eq!(of_other_round.status, 409, "{}", of_other_round.body);
+        let started = redirect_target(&grace.submit(&decision, &[]).await);
+        assert_eq!(started, format!("{page}?done=round-started"));
+        // A second click on the button, while the round is running and after it.
+        for is_over in [false, true] {
+            if is_over {
+                assert_eq!(cup.play(first_by_name_wins).await, 1);
+            }
+            for again in [
+                grace.submit(&decision, &[]).await,
+                grace.open(&decision).await,
+            ] {
+                let text = texts(&again.html(409), "main").remove(0);
+                let expected = format!("round {number} has started already");
+                assert!(text.contains(&expected), "{text}");
+                assert!(!again.body.contains("Start round"), "{}", again.body);
+            }
+        }
+        let rounds = cup.view().await["rounds"].as_array().unwrap().len();
+        assert_eq!(rounds, number as usize);
+    }
+}
+
+#[tokio::test]
+async fn final_preview_names_the_teams_that_advanced() {
+    let format = json!({ "kind": "groups", "groups": 2, "advance": 1 });
+    let body = json!({ "rules": { "format": format } });
+    let cup = TestTournament::open(&["A", "B", "C", "D"], body).await;
+    let mut grace = organiser(&cup.site, "Grace").await;
+    let page = cup.path.replace("/api/v1", "/organiser");
+    let (effects, _) = decide(&mut grace, &page, "start-round").await;
+    assert!(effects.contains("between the 4 teams are"), "{effects}");
+    assert_eq!(cup.play(first_by_name_wins).await, 2);
+    let (effects, target) = decide(&mut grace, &page, "start-round").await;
+    assert!(
+        effects.contains("between the teams that advanced from the groups are"),
+        "{effects}"
+    );
+    assert_eq!(target, format!("{page}?done=round-started"));
+    let view = cup.view().await;
+    assert_eq!(
+        view["rounds"][1]["submissions"].as_array().unwrap().len(),
+        2
+    );
+}
+
+#[tokio::test]
+async fn withdrawn_team_can_be_disqualified_on_the_page() {
+    let cup = TestTournament::open(&["A", "B", "C"], json!({})).await;
+    cup.start_round().await;
+    let mut grace = organiser(&cup.site, "Grace").await;
+    let page = cup.path.replace("/api/v1", "/organiser");
+    let link_of_a = format!("main a[href$='/{}'][href*='-team/']", cup.teams["A"].id);
+    let id = cup.path.rsplit('/').next().unwrap();
+    let path = |decision: &str| {
+        let team = &cup.teams["A"].id;
+        format!("/organiser/decide/{decision}-team/{id}/{team}")
+    };
+    let html = dashboard_page(&grace.open(&page).await, 200);
+    let both = [path("withdraw"), path("disqualify")];
+    assert_eq!(links(&html, &link_of_a), both);
+    decide(&mut grace, &page, "withdraw-team").await;
+    let html = dashboard_page(&grace.open(&page).await, 200);
+    assert_eq!(links(&html, &link_of_a), [path("disqualify")]);
+    let (_, target) = decide(&mut grace, &page, "disqualify-team").await;
+    assert_eq!(target, format!("{page}?done=team-left"));
+    let html = dashboard_page(&grace.open(&page).await, 200);
+    assert!(links(&html, &link_of_a).is_empty());
+    let view = cup.view().await;
+    let departure = &view["entrants"][0]["departure"];
+    assert_eq!(departure["as"], "disqualified", "{view}");
+}
+
+#[tokio::test]
 async fn refused_tournament_form_keeps_what_was_typed() {
     let site = Site::start().await;
     let mut grace = organiser(&site, "Grace").await;
+    let page = dashboard_page(&grace.open(PATH).await, 200);
+    let label = texts(&page, "label[for=teams]").remove(0);
+    assert!(
+        label.contains("for all deployable and improvable teams of the stage"),
+        "{label}"
+    );
     for (changed, expected) in [
         (("teams", "Unknown"), "no team"),
         (("rounds", "many"), "expected a number"),
@@ -179,8 +278,10 @@ async fn teams_leave_by_a_decision_of_organisers() {
     let mut grace = organiser(&cup.site, "Grace").await;
     let page = cup.path.replace("/api/v1", "/organiser");
     let (effects, target) = decide(&mut grace, &page, "disqualify-team").await;
-    assert!(effects.starts_with("A would be disqualified"), "{effects}");
-    assert!(effects.contains("the reason would be public"), "{effects}");
+    let outcome =
+        "A would be disqualified for good, with a public reason, and would rank below all others. ";
+    assert!(effects.starts_with(outcome), "{effects}");
+    assert!(effects.contains(". 2 of its games, and"), "{effects}");
     assert_eq!(target, format!("{page}?done=team-left"));
     let (_, _) = decide(&mut grace, &page, "withdraw-team").await;
     let departures: Vec<(Value, Value)> = cup.view().await["entrants"]
@@ -203,7 +304,10 @@ async fn teams_leave_by_a_decision_of_organisers() {
 #[tokio::test]
 async fn tournament_decisions_are_for_organisers_only() {
     let cup = TestTournament::open(&["A", "B"], json!({})).await;
+    cup.start_round().await;
+    assert_eq!(cup.play(first_by_name_wins).await, 1);
     let site = &cup.site;
+    site.team("C").await;
     let role = json!({ "role": "member", "team": cup.teams["A"].id, "note": "Ada" });
     let mut ada = Browser::join(site, "Ada", role).await;
     let mut visitor = Browser::new(site);
@@ -214,14 +318,23 @@ async fn tournament_decisions_are_for_organisers_only() {
         let asked = redirect_target(&visitor.open(path).await);
         assert!(asked.starts_with("/sign-in?next=%2Forganiser"), "{asked}");
     }
-    let team = string(&cup.view().await["entrants"][0]["team"]);
+    let before = (cup.view().await, cup.games().await);
+    let team = string(&before.0["entrants"][0]["team"]);
+    let game = string(&before.1[0]["id"]);
+    let (home, away) = team_names(&before.1[0]);
+    let pairing = format!("{home} - {away}");
+    let mut grace = organiser(site, "Grace").await;
     for (path, fields) in [
         (PATH.to_owned(), vec![("name", "Mine")]),
-        (format!("{page}/teams"), vec![("teams", "A")]),
-        (format!("/organiser/decide/start-round/{id}"), Vec::new()),
+        (format!("{page}/teams"), vec![("teams", "C")]),
+        (format!("/organiser/decide/start-round/{id}/2"), Vec::new()),
         (
             format!("/organiser/decide/pause-tournament/{id}"),
             vec![("reason", "mine")],
+        ),
+        (
+            format!("/organiser/decide/resume-tournament/{id}"),
+            Vec::new(),
         ),
         (
             format!("/organiser/decide/close-tournament/{id}"),
@@ -231,18 +344,34 @@ async fn tournament_decisions_are_for_organisers_only() {
             format!("/organiser/decide/withdraw-team/{id}/{team}"),
             vec![("reason", "mine"), ("confirm", "A")],
         ),
+        (
+            format!("/organiser/decide/disqualify-team/{id}/{team}"),
+            vec![("reason", "mine"), ("confirm", "A")],
+        ),
+        (
+            format!("/organiser/decide/void-game/{game}"),
+            vec![("reason", "mine"), ("confirm", pairing.as_str())],
+        ),
+        (format!("/organiser/decide/rerun-game/{game}"), Vec::new()),
     ] {
         let refused = ada.submit(&path, &fields).await;
         assert_eq!(refused.status, 403, "{path}: {}", refused.body);
         let asked = visitor.submit(&path, &fields).await;
         assert!(asked.status == 401 || asked.status == 303, "{path}");
+        let fields = fields.iter();
+        let form = Form {
+            action: path,
+            is_post: true,
+            is_multipart: false,
+            fields: fields
+                .map(|(name, value)| ((*name).to_owned(), (*value).to_owned()))
+                .collect(),
+        };
+        for refused in grace.submit_from_foreign_page(&form).await {
+            assert_eq!(refused.status, 403, "{form:?}: {}", refused.body);
+        }
     }
-    let view = cup.view().await;
-    assert_eq!(
-        (&view["phase"], &view["paused"]),
-        (&json!("open"), &Value::Null)
-    );
-    assert_eq!(view["entrants"].as_array().unwrap().len(), 2);
+    assert_eq!((cup.view().await, cup.games().await), before);
     let all = site.get("/api/v1/tournaments", Some(ADMIN)).await.json(200);
     assert_eq!(all.as_array().unwrap().len(), 1);
 }

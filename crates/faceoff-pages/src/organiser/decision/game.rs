@@ -3,7 +3,9 @@
 use super::preview::{DecisionPreview, Done, PUBLIC_REASON};
 use crate::organiser::tournament::page_path;
 use faceoff_api::requests;
-use faceoff_service::{app::AppState, problem::Problem, services::games};
+use faceoff_service::{
+    app::AppState, problem::Problem, services::games, viewer::Viewer, views::game,
+};
 use faceoff_store::Actor;
 use faceoff_types::GameId;
 
@@ -27,9 +29,9 @@ impl GameDecision {
                 })
             }
             Self::Rerun(id) => {
-                let game = app.store.game(id).await?;
+                let (state, game) = game::find_visible(app, Viewer::Organiser, id).await?;
                 Ok(DecisionPreview {
-                    title: format!("Rerun {}", games::pairing_name(app, &game).await?),
+                    title: format!("Rerun {}", games::pairing_name(&state, &game)?),
                     effects:
                         "The game is queued again, with the same submissions and the same seed."
                             .to_owned(),

@@ -11,12 +11,13 @@ use faceoff_service::{
         tournament_rounds, tournaments,
     },
 };
-use faceoff_store::Actor;
-use faceoff_types::{DepartureKind, TeamId, TournamentId};
+use faceoff_store::{Actor, TournamentRecord};
+use faceoff_types::{DepartureKind, RoundNumber, TeamId, TournamentFormat, TournamentId};
 
 #[derive(Debug, Clone, Copy)]
 pub(in crate::organiser) enum TournamentDecision {
-    StartRound(TournamentId),
+    /// Start the round with this number, which has to be the next one.
+    StartRound(TournamentId, RoundNumber),
     Pause(TournamentId),
     Resume(TournamentId),
     Close(TournamentId),
@@ -32,9 +33,23 @@ const fn departure(team: TeamId, kind: DepartureKind) -> PlannedDeparture<'stati
     }
 }
 
+/// The teams among which the round is drawn.
+fn round_teams(record: &TournamentRecord, number: RoundNumber) -> String {
+    let has_groups = matches!(
+        record.tournament.rules.format,
+        TournamentFormat::Groups { .. }
+    );
+    if has_groups && number > RoundNumber::FIRST {
+        return "the teams that advanced from the groups".to_owned();
+    }
+    let entrants = record.entrants.iter();
+    let teams = entrants.filter(|entrant| entrant.departure.is_none());
+    format!("the {} teams", teams.count())
+}
+
 impl TournamentDecision {
     const fn tournament(self) -> TournamentId {
-        let (Self::StartRound(id)
+        let (Self::StartRound(id, _)
         | Self::Pause(id)
         | Self::Resume(id)
         | Self::Close(id)
@@ -49,14 +64,14 @@ impl TournamentDecision {
         let record = app.store.tournament_record(id).await?;
         let name = &record.tournament.name;
         Ok(match self {
-            Self::StartRound(_) => {
-                let teams = record.entrants.iter();
+            Self::StartRound(_, number) => {
+                tournament_rounds::check_next_round(number, record.rounds.len())?;
                 DecisionPreview {
-                    title: format!("Start round {} of {name}", record.rounds.len() + 1),
+                    title: format!("Start round {number} of {name}"),
                     effects: format!(
-                        "The games between the {} teams are drawn and queued. The submission of each team that is active now plays the \
-                         whole round; later uploads are for the next one.",
-                        teams.filter(|entrant| entrant.departure.is_none()).count()
+                        "The games between {} are drawn and queued. For each of these teams, the submission that is active now plays \
+                         the whole round; later uploads are for the next one.",
+                        round_teams(&record, number)
                     ),
                     button: "Start the round",
                     ..preview
@@ -110,8 +125,8 @@ impl TournamentDecision {
     ) -> Result<Done, Problem> {
         let confirm = request.confirm.as_deref();
         let notice = match self {
-            Self::StartRound(id) => {
-                tournament_rounds::start_round(app, actor, id).await?;
+            Self::StartRound(id, number) => {
+                tournament_rounds::start_round(app, actor, id, Some(number)).await?;
                 "round-started"
             }
             Self::Pause(id) => {
