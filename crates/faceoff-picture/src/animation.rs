@@ -1,8 +1,8 @@
-//! Animated GIF with a fixed palette: a drawing of few colours, so no picture needs a palette of its own.
+//! Animated GIF with a fixed palette: a drawing of few colours, so no frame needs a palette of its own.
 
 use crate::pixels::{Picture, PictureError};
 use gif::{Encoder, Frame, Repeat};
-use std::{collections::HashMap, io::Write, iter};
+use std::{collections::HashMap, iter};
 
 /// Time of a frame, in hundredths of a second, which are the units of GIF: 25 frames per second.
 pub const FRAME_TIME_CS: u16 = 4;
@@ -79,24 +79,25 @@ fn distance(first: Colour, second: Colour) -> u32 {
     squares.sum()
 }
 
-/// An animated GIF that is being written. It repeats without end.
-pub struct Animation<W: Write> {
-    encoder: Encoder<W>,
+/// An animated GIF that is being written, in memory. It repeats without end.
+pub struct Animation {
+    encoder: Encoder<Vec<u8>>,
     palette: Palette,
     size: [u16; 2],
     /// The colours of the last frame by their index; empty before the first one.
     shown: Vec<u8>,
 }
 
-impl<W: Write> Animation<W> {
-    /// An animation of pictures of this size.
+impl Animation {
+    /// An animation with frames of this size.
     ///
     /// # Errors
-    /// If the size is above 65,535 pixels, or the file cannot be written.
-    pub fn new(out: W, [width, height]: [u32; 2], palette: Palette) -> Result<Self, PictureError> {
+    /// If the size is above 65,535 pixels, or the encoder fails.
+    pub fn new([width, height]: [u32; 2], palette: Palette) -> Result<Self, PictureError> {
         let size = u16::try_from(width).ok().zip(u16::try_from(height).ok());
         let (columns, lines) = size.ok_or(PictureError::Size { width, height })?;
-        let mut encoder = Encoder::new(out, columns, lines, &palette.bytes()).map_err(gif_error)?;
+        let mut encoder =
+            Encoder::new(Vec::new(), columns, lines, &palette.bytes()).map_err(gif_error)?;
         encoder.set_repeat(Repeat::Infinite).map_err(gif_error)?;
         Ok(Self {
             encoder,
@@ -106,10 +107,10 @@ impl<W: Write> Animation<W> {
         })
     }
 
-    /// Appends a picture, of which only the part that has changed is written.
+    /// Appends a picture as a frame, of which only the part that has changed is written.
     ///
     /// # Errors
-    /// If the picture has another size, or the file cannot be written.
+    /// If the picture has another size, or the encoder fails.
     pub fn add(&mut self, picture: &Picture) -> Result<(), PictureError> {
         let [width, height] = picture.size();
         if [width, height] != self.size.map(u32::from) {
@@ -166,11 +167,11 @@ impl<W: Write> Animation<W> {
         self.encoder.write_frame(&frame).map_err(gif_error)
     }
 
-    /// Ends the file.
+    /// The complete file.
     ///
     /// # Errors
-    /// If the file cannot be written.
-    pub fn finish(self) -> Result<W, PictureError> {
+    /// If the encoder fails.
+    pub fn finish(self) -> Result<Vec<u8>, PictureError> {
         self.encoder.into_inner().map_err(gif_error)
     }
 }
@@ -198,7 +199,7 @@ impl Part {
         }
     }
 
-    /// The smallest part in which two pictures differ; one pixel if they are equal.
+    /// The smallest part in which two frames differ; one pixel if they are equal.
     fn changed(before: &[u8], after: &[u8], columns: usize) -> Self {
         let differing = before.iter().zip(after).enumerate();
         let differing = differing.filter(|(_, (before, after))| before != after);
@@ -260,7 +261,7 @@ mod tests {
     #[test]
     fn animation_has_frames_with_what_has_changed() {
         let size = [40, 20];
-        let mut animation = Animation::new(Vec::new(), size, Palette::new(&COLOURS)).unwrap();
+        let mut animation = Animation::new(size, Palette::new(&COLOURS)).unwrap();
         for x in [0.0, 0.0, 10.0] {
             let mut drawing = Drawing::new(40, 20, "#ffffff");
             drawing.rectangle([x, 5.0], [10.0, 10.0], "#c80000");
@@ -288,8 +289,8 @@ mod tests {
     }
 
     #[test]
-    fn animation_of_too_large_pictures_is_refused() {
-        let made = Animation::new(Vec::new(), [70_000, 10], Palette::new(&COLOURS));
+    fn animation_of_too_large_frames_is_refused() {
+        let made = Animation::new([70_000, 10], Palette::new(&COLOURS));
         assert!(made.is_err());
     }
 }

@@ -363,7 +363,8 @@ async fn read_json<T: DeserializeOwned>(response: Response) -> anyhow::Result<T>
 }
 
 /// A path beside `file`, for a part of it or about it.
-fn with_suffix(file: &Path, suffix: &str) -> PathBuf {
+#[must_use]
+pub fn with_suffix(file: &Path, suffix: &str) -> PathBuf {
     let mut path = file.as_os_str().to_owned();
     path.push(suffix);
     PathBuf::from(path)

@@ -195,12 +195,12 @@ fn check_renameable(target: &Path, parent: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Syncs the entries of a folder to disk.
+/// Syncs a file, or the entries of a folder, to disk.
 ///
 /// # Errors
-/// If the folder cannot be synced.
-pub fn sync(folder: &Path) -> anyhow::Result<()> {
-    File::open(folder)
-        .and_then(|folder| folder.sync_all())
-        .with_context(|| format!("writing {}", folder.display()))
+/// If it cannot be synced.
+pub fn sync(path: &Path) -> anyhow::Result<()> {
+    File::open(path)
+        .and_then(|opened| opened.sync_all())
+        .with_context(|| format!("writing {}", path.display()))
 }

@@ -3,6 +3,7 @@
 mod ablation_text;
 pub mod activate;
 pub mod admin;
+mod atomic_file;
 mod atomic_folder;
 pub mod backup;
 pub mod board;

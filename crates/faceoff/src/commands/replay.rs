@@ -1,4 +1,4 @@
-//! `faceoff replay`: draws an episode of a dataset or a recorded game as an HTML page, an SVG picture, or a film.
+//! `faceoff replay`: draws an episode of a dataset or a recorded game as an HTML page, an SVG picture, or a video.
 
 mod episode;
 mod game;
@@ -21,7 +21,7 @@ use std::path::PathBuf;
 use video::VideoOptions;
 
 /// Draws a recorded game, or one episode of a dataset, as a page (.html), which is animated and needs no network, as a
-/// picture (.svg), or as a film (--video). A game: the table from above, goals, fouls and faults as links into the replay, and the causes of penalty
+/// picture (.svg), or as a video (--video). A game: the table from above, goals, fouls and faults as links into the replay, and the causes of penalty
 /// points. An episode: the table, true and observed puck, speeds, constraints, computation times, and the reason of its end.
 #[derive(Debug, Args)]
 pub struct ReplayCommand {
@@ -37,8 +37,8 @@ pub struct ReplayCommand {
     /// Of the folder of a series: the game, from 1 in the order of play
     #[arg(long, value_name = "N", conflicts_with = "task")]
     game: Option<u32>,
-    /// Of a game: the rally, from 0, that a picture or a film shows and at which a page begins [default: a picture shows the
-    /// last, a film the whole game]
+    /// Of a game: the rally, from 0, that a picture or a video shows and at which a page begins [default: a picture shows the
+    /// last, a video the whole game]
     #[arg(long, value_name = "N", conflicts_with = "task")]
     rally: Option<u32>,
     /// The file to write, a page (.html) or a picture (.svg); an existing file is replaced

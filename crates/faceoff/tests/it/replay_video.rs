@@ -1,4 +1,4 @@
-//! `faceoff replay --video`: films of episodes and games.
+//! `faceoff replay --video`: videos of episodes and games.
 
 use crate::{
     program::{command, faceoff, file_names, text},
@@ -16,7 +16,7 @@ use std::{
 use tempfile::TempDir;
 
 const SIZE: [usize; 2] = [960, 606];
-/// Pictures of the last moment of a GIF.
+/// Frames of the last moment of a GIF.
 const FINAL_FRAMES: usize = 25;
 
 fn episode(file: &Path, options: &[&str]) -> Output {
@@ -48,16 +48,16 @@ fn refused(output: &Output, words: &[&str]) {
     }
 }
 
-/// The pictures of a GIF, as indices of colours.
+/// The frames of a GIF, as indices of colours.
 fn decode(file: &Path) -> Vec<Vec<u8>> {
     let bytes = fs::read(file).unwrap();
     let mut decoder = gif::DecodeOptions::new().read_info(&bytes[..]).unwrap();
     let size = [decoder.width(), decoder.height()].map(usize::from);
     assert_eq!(size, SIZE);
     let mut screen = vec![0; size[0] * size[1]];
-    let mut pictures = Vec::new();
+    let mut frames = Vec::new();
     while let Some(frame) = decoder.read_next_frame().unwrap() {
-        assert_eq!(frame.delay, 4, "25 pictures per second");
+        assert_eq!(frame.delay, 4, "25 frames per second");
         let lines = frame.buffer.chunks(usize::from(frame.width));
         for (line, pixels) in lines.enumerate() {
             let start = (usize::from(frame.top) + line) * size[0] + usize::from(frame.left);
@@ -67,9 +67,9 @@ fn decode(file: &Path) -> Vec<Vec<u8>> {
                 }
             }
         }
-        pictures.push(screen.clone());
+        frames.push(screen.clone());
     }
-    pictures
+    frames
 }
 
 /// The control steps of the episode.
@@ -87,19 +87,19 @@ fn episode_steps() -> usize {
 }
 
 #[test]
-fn film_of_an_episode_shows_all_of_it() {
+fn video_of_an_episode_shows_all_of_it() {
     let (_dir, file) = target("look.gif");
-    let output = episode(&file, &[]);
+    let output = episode(&file, &["--speed", "4"]);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let stdout = text(&output.stdout);
     assert!(stdout.starts_with("hit, episode 0 of "), "{stdout}");
-    let pictures = decode(&file);
-    // Two control steps per picture.
-    let moving = episode_steps().div_ceil(2) + 1;
-    assert_eq!(pictures.len(), moving + FINAL_FRAMES - 1);
-    assert!(pictures[0] != pictures[moving - 1]);
+    let frames = decode(&file);
+    // Eight control steps per frame.
+    let moving = episode_steps().div_ceil(8) + 1;
+    assert_eq!(frames.len(), moving + FINAL_FRAMES - 1);
+    assert!(frames[0] != frames[moving - 1]);
     assert!(
-        pictures[moving - 1] == pictures[moving + FINAL_FRAMES - 2],
+        frames[moving - 1] == frames[moving + FINAL_FRAMES - 2],
         "the end stays"
     );
 }
@@ -112,17 +112,16 @@ fn part_of_a_game_is_chosen_by_time_rally_and_speed() {
         assert!(output.status.success(), "{}", text(&output.stderr));
         decode(&file).len() - FINAL_FRAMES + 1
     };
-    // 2 s of 50 control steps.
-    assert_eq!(frames(&["--from", "1", "--to", "3"]), 51);
-    assert_eq!(frames(&["--from", "1", "--to", "3", "--speed", "4"]), 14);
+    // 1 s has 50 control steps, and two of them pass per frame.
+    assert_eq!(frames(&["--from", "1", "--to", "2"]), 26);
+    assert_eq!(frames(&["--from", "1", "--to", "2", "--speed", "4"]), 8);
     assert_eq!(frames(&["--from", "19.9"]), 4, "the game has 20 s");
-    // The rally ends with the foul after 15.02 s.
-    let rally = frames(&["--rally", "0", "--speed", "10"]);
-    assert!((38..=40).contains(&rally), "{rally}");
+    // The rally ends with the foul after 15.02 s, which are 9.4 times 80 control steps; the game would have 14 frames.
+    assert_eq!(frames(&["--rally", "0", "--speed", "40"]), 11);
 }
 
 #[test]
-fn pictures_are_numbered_in_an_empty_folder() {
+fn frames_are_numbered_in_an_empty_folder() {
     let (dir, folder) = target("frames/");
     let span = ["--from", "0", "--to", "0.1"];
     let output = game(&folder, &span);
@@ -162,7 +161,7 @@ fn game_with_path(file: &Path, programs: &Path) -> Output {
         "replay",
         recording.to_str().unwrap(),
         "--from",
-        "19",
+        "19.8",
         "--video",
     ])
     .arg(file)
@@ -179,11 +178,11 @@ fn mpeg4_needs_ffmpeg_and_says_so() {
         &output,
         &["ffmpeg", "not installed", "apt install ffmpeg", "game.gif"],
     );
-    assert!(!file.exists());
+    assert!(file_names(dir.path()).is_empty());
 }
 
 #[test]
-fn ffmpeg_gets_the_pixels_of_all_pictures() {
+fn ffmpeg_gets_the_pixels_of_all_frames() {
     let (dir, file) = target("game.mp4");
     let program = dir.path().join("ffmpeg");
     let write_program = |script: &str| {
@@ -202,18 +201,23 @@ fn ffmpeg_gets_the_pixels_of_all_pictures() {
         arguments.contains("-video_size 960x606 -framerate 25"),
         "{arguments}"
     );
-    let pictures = 26 + FINAL_FRAMES - 1;
-    assert_eq!(bytes.parse(), Ok(SIZE[0] * SIZE[1] * 3 * pictures));
+    let frames = 6 + FINAL_FRAMES - 1;
+    assert_eq!(bytes.parse(), Ok(SIZE[0] * SIZE[1] * 3 * frames));
 
-    write_program("echo 'no such codec' >&2; exit 3");
+    write_program(
+        "for last; do :; done; echo half > \"${last#file:}\"; echo 'no such codec' >&2; exit 3",
+    );
     refused(
         &game_with_path(&file, dir.path()),
         &["ffmpeg ended with", "no such codec"],
     );
+    let kept = fs::read_to_string(&file).unwrap();
+    assert_eq!(kept, written, "the earlier video stays");
+    assert_eq!(file_names(dir.path()), ["ffmpeg", "game.mp4"]);
 }
 
 #[test]
-fn unsuitable_film_is_refused_with_a_reason() {
+fn unsuitable_video_is_refused_with_a_reason() {
     let (dir, file) = target("game.webm");
     refused(&game(&file, &[]), &["ends in .gif or .mp4", "game.webm"]);
     let file = dir.path().join("game.gif");
@@ -227,11 +231,7 @@ fn unsuitable_film_is_refused_with_a_reason() {
         (&["--speed", "0"], &["from 0.1 to 100"]),
         (
             &["--speed", "0.1"],
-            &[
-                "5001 pictures",
-                "--from SECONDS and --to SECONDS",
-                "--rally",
-            ],
+            &["5001 frames", "--from SECONDS and --to SECONDS", "--rally"],
         ),
         (&["--rally", "0", "--from", "1"], &["cannot be used with"]),
     ] {
@@ -243,7 +243,7 @@ fn unsuitable_film_is_refused_with_a_reason() {
     refused(&faceoff(&["replay", recording]), &["--out <FILE>"]);
     for (name, options, words) in [
         ("a.html", &["--from", "1"][..], "--out <FILE>"),
-        ("a.gif", &[], "films are written by --video"),
+        ("a.gif", &[], "videos are written by --video"),
     ] {
         let file = dir.path().join(name);
         let fixed = ["replay", recording, "--out", file.to_str().unwrap()];

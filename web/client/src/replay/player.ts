@@ -58,6 +58,8 @@ export class Player {
   private wasPlaying = false;
   private shownEvents: readonly ReplayEvent[] | null = null;
   private isLinkFollowed = false;
+  /** What a link says about one table, until both replays are loaded. */
+  private linkedOneTable: boolean | null = null;
 
   constructor(private readonly options: PlayerOptions) {
     const { clock, sections } = options;
@@ -137,6 +139,7 @@ export class Player {
     if (!opened.some(Boolean)) return;
     this.oneTable?.enable(this.viewers.every((viewer) => viewer.drawnFrame !== null));
     this.invalidate();
+    this.followOneTable();
     // The others may have been moved since then when one of several replays is opened again.
     if (this.isLinkFollowed) return;
     this.isLinkFollowed = true;
@@ -301,7 +304,8 @@ export class Player {
     const { step, camera, flat, ghost, speed, layers, arm, hiddenKinds } = target;
     if (camera !== undefined) this.forEach((viewer) => { viewer.picture.setCamera(camera); }); // prettier-ignore
     if (flat !== undefined) this.forEach((viewer) => { viewer.picture.setFlat(flat); }); // prettier-ignore
-    if (ghost !== undefined && this.oneTable?.isPossible === true) this.showOnOneTable(ghost);
+    if (ghost !== undefined) this.linkedOneTable = ghost;
+    this.followOneTable();
     if (speed !== undefined) clock.setSpeed(speed);
     if (layers !== undefined) this.layerChoice.set(layers);
     if (arm !== undefined) this.forEach((viewer) => { viewer.strips.setArm(arm); }); // prettier-ignore
@@ -310,6 +314,12 @@ export class Player {
     this.seek(step);
     this.scrollToPicture();
     if (!prefersReducedMotion && clock.position < clock.last) clock.play();
+  }
+
+  private followOneTable(): void {
+    if (this.linkedOneTable === null || this.oneTable?.isPossible !== true) return;
+    this.showOnOneTable(this.linkedOneTable);
+    this.linkedOneTable = null;
   }
 
   private fragment(): string {

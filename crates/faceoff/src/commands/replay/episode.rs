@@ -41,7 +41,7 @@ pub fn draw(dataset: &Path, task: Task, episode: u32, output: &Output) -> anyhow
     })
 }
 
-/// The episode as a film shows it.
+/// The episode as a video shows it.
 fn scene(recording: &EpisodeRecording) -> Scene {
     // The opponent is recorded from the first step on.
     let opponent = recording.opponent.first().into_iter();

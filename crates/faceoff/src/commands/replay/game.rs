@@ -70,7 +70,7 @@ pub fn draw(path: &Path, rally: Option<u32>, output: &Output) -> anyhow::Result<
     })
 }
 
-/// The game as a film shows it.
+/// The game as a video shows it.
 fn scene(game: &RecordedGame) -> Scene {
     let [home, away] = &game.agents;
     let mut captions = vec![(0, format!("{home} 0 : 0 {away}"))];

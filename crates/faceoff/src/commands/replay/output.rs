@@ -1,11 +1,9 @@
 //! The file that `faceoff replay` writes.
 
 use super::video::{Video, VideoOptions};
-use anyhow::{Context, bail};
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use crate::commands::atomic_file::AtomicFile;
+use anyhow::bail;
+use std::path::{Path, PathBuf};
 
 #[derive(Debug, Clone, PartialEq)]
 pub enum Format {
@@ -21,7 +19,7 @@ impl Format {
             Some("html" | "htm") => Ok(Self::Html),
             Some("svg") => Ok(Self::Svg),
             _ => bail!(
-                "--out: expected a file that ends in .html or .svg, got {}; films are written by --video",
+                "--out: expected a file that ends in .html or .svg, got {}; videos are written by --video",
                 path.display()
             ),
         }
@@ -58,6 +56,6 @@ impl Output {
     }
 
     pub fn write(&self, text: String) -> anyhow::Result<()> {
-        fs::write(&self.file, text).with_context(|| format!("writing {}", self.file.display()))
+        AtomicFile::create(&self.file)?.write(text)
     }
 }

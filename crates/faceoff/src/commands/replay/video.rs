@@ -1,41 +1,42 @@
-//! Films of a recording: 25 pictures per second of the table from above.
+//! Videos of a recording: 25 frames per second of the table from above.
 
-mod film;
+mod encoder;
+mod ffmpeg;
 mod scene;
 
 use anyhow::{Context, bail};
 use clap::Args;
+use encoder::Encoder;
 use faceoff_picture::FRAME_TIME_CS;
 use faceoff_types::CONTROL_STEP_S;
-use film::Film;
 use indicatif::ProgressBar;
 pub use scene::{Sample, Scene};
 use std::path::{Path, PathBuf};
 
-/// Seconds between two pictures.
+/// Seconds between two frames.
 const FRAME_TIME_S: f64 = FRAME_TIME_CS as f64 / 100.0;
-/// Pictures of the last moment, which stays for a second.
+/// Frames of the last moment, which stays for a second.
 const FINAL_FRAMES: usize = 25;
-/// Largest number of pictures of each format, without those of the last moment. A GIF of a minute has some megabytes, and most
-/// programs show no longer one well; a film has room for a game of 15 minutes.
+/// Largest number of frames of each format, without those of the last moment. A GIF of a minute has some megabytes, and most
+/// programs show no longer one well; an MPEG-4 has room for a game of 15 minutes.
 const MAX_GIF_FRAMES: usize = 1_500;
 const MAX_PNG_FRAMES: usize = 5_000;
 const MAX_MPEG4_FRAMES: usize = 30_000;
 
 #[derive(Debug, Args)]
 pub struct VideoOptions {
-    /// The film to write instead, 25 pictures per second: an animated GIF (.gif), MPEG-4 (.mp4, for which ffmpeg must be
-    /// installed), or a folder for numbered pictures in PNG (its name ends with /, or it exists and is empty). An existing file
+    /// The video to write instead, 25 frames per second: an animated GIF (.gif), MPEG-4 (.mp4, for which ffmpeg must be
+    /// installed), or a folder for numbered frames in PNG (its name ends with /, or it exists and is empty). An existing file
     /// is replaced
     #[arg(long, value_name = "FILE")]
     video: Option<PathBuf>,
-    /// Of a film: its first moment, in seconds since the start of the recording [default: the start]
+    /// Of a video: its first moment, in seconds since the start of the recording [default: the start]
     #[arg(long, value_name = "SECONDS", requires = "video", value_parser = parse_seconds, conflicts_with_all = ["rally", "out"])]
     from: Option<f64>,
-    /// Of a film: its last moment [default: the end]
+    /// Of a video: its last moment [default: the end]
     #[arg(long, value_name = "SECONDS", requires = "video", value_parser = parse_seconds, conflicts_with_all = ["rally", "out"])]
     to: Option<f64>,
-    /// Of a film: how many seconds of the recording pass in a second, 0.1 to 100 [default: 1]
+    /// Of a video: how many seconds of the recording pass in a second, 0.1 to 100 [default: 1]
     #[arg(long, value_name = "FACTOR", requires = "video", conflicts_with = "out", value_parser = parse_speed)]
     speed: Option<f64>,
 }
@@ -47,7 +48,7 @@ enum VideoFormat {
     Png,
 }
 
-/// A film to write.
+/// A video to write.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Video {
     format: VideoFormat,
@@ -81,7 +82,7 @@ impl VideoFormat {
             Some("gif") => Ok(Self::Gif),
             Some("mp4") => Ok(Self::Mpeg4),
             _ => bail!(
-                "--video: expected a file that ends in .gif or .mp4, or a folder for pictures that ends with /, got {}",
+                "--video: expected a file that ends in .gif or .mp4, or a folder for frames that ends with /, got {}",
                 path.display()
             ),
         }
@@ -98,14 +99,14 @@ impl VideoFormat {
     const fn name(self) -> &'static str {
         match self {
             Self::Gif => "a GIF",
-            Self::Mpeg4 => "an MPEG-4 film",
-            Self::Png => "a folder of pictures",
+            Self::Mpeg4 => "an MPEG-4",
+            Self::Png => "a folder of frames",
         }
     }
 }
 
 impl VideoOptions {
-    /// The film to write and its file; `None` without the option.
+    /// The video to write and its file; `None` without the option.
     pub fn video(&self) -> anyhow::Result<Option<(PathBuf, Video)>> {
         let Some(file) = &self.video else {
             return Ok(None);
@@ -121,34 +122,35 @@ impl VideoOptions {
 }
 
 impl Video {
-    /// Writes the film of a scene. `span`: its first and last sample, unless the options have others.
+    /// Writes the video of a scene. `span`: its first and last sample, unless the options have others.
     pub fn write(&self, scene: &Scene, span: [usize; 2], file: &Path) -> anyhow::Result<()> {
         let frames = self.frames(scene, span)?;
         let backdrop = scene.backdrop()?;
-        let mut film = match self.format {
-            VideoFormat::Gif => Film::gif(file, backdrop.size())?,
-            VideoFormat::Mpeg4 => Film::mpeg4(file, backdrop.size())?,
-            VideoFormat::Png => Film::png(file)?,
+        let mut encoder = match self.format {
+            VideoFormat::Gif => Encoder::gif(file, backdrop.size())?,
+            VideoFormat::Mpeg4 => Encoder::mpeg4(file, backdrop.size())?,
+            VideoFormat::Png => Encoder::png(file)?,
         };
         let bar = ProgressBar::new(frames.len() as u64);
         for (index, sample) in frames.iter().enumerate() {
-            let picture = scene.picture(&backdrop, *sample)?;
+            let frame = scene.frame(&backdrop, *sample)?;
             let is_last = index + 1 == frames.len();
             let copies = match is_last && self.format != VideoFormat::Png {
                 true => FINAL_FRAMES,
                 false => 1,
             };
             for _ in 0..copies {
-                film.add(&picture)?;
+                encoder.add(&frame)?;
             }
             bar.inc(1);
         }
         bar.finish_and_clear();
-        film.finish()
+        encoder
+            .finish()
             .with_context(|| format!("writing {}", file.display()))
     }
 
-    /// The sample of each picture.
+    /// The sample of each frame.
     fn frames(&self, scene: &Scene, span: [usize; 2]) -> anyhow::Result<Vec<usize>> {
         let [_, end] = scene.whole();
         let sample = |seconds: f64| (seconds / CONTROL_STEP_S).round() as usize;
@@ -170,12 +172,12 @@ impl Video {
             );
         }
         let samples_per_frame = self.speed * FRAME_TIME_S / CONTROL_STEP_S;
-        // Without the tolerance, a rounding error could add a picture.
+        // Without the tolerance, a rounding error could add a frame.
         let steps = ((to - from) as f64 / samples_per_frame - 1e-9).ceil() as usize;
         let max_frames = self.format.max_frames();
         if steps >= max_frames {
             bail!(
-                "{:.0} s are {} pictures, and {} has at most {max_frames}: choose a part with --from SECONDS and --to SECONDS (of a \
+                "{:.0} s are {} frames, and {} has at most {max_frames}: choose a part with --from SECONDS and --to SECONDS (of a \
                  game also with --rally N), or a higher --speed{}",
                 seconds(to - from),
                 steps + 1,

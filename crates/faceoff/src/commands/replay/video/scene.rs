@@ -1,4 +1,4 @@
-//! What a film shows: the table from above with puck and mallets, the puck's trail, a caption and the time.
+//! What a video shows: the table from above with puck and mallets, the puck's trail, a caption and the time.
 
 use super::super::table_parts::{
     self, DISC_COLOURS, PATH_COLOURS, TABLE_COLOURS, disc, height_px, path,
@@ -25,7 +25,7 @@ pub struct Sample {
     pub mallets: [Option<[f64; 2]>; 2],
 }
 
-/// A recording as a film shows it.
+/// A recording as a video shows it.
 #[derive(Debug)]
 pub struct Scene {
     /// After 0, 1, 2 … control steps; never empty.
@@ -40,7 +40,7 @@ pub struct Scene {
     pub ground: String,
 }
 
-/// The colours of a film.
+/// The colours of a video.
 pub fn colours() -> Vec<[u8; 3]> {
     let all = [GROUND].into_iter().chain(TABLE_COLOURS);
     let all = all.chain(PATH_COLOURS).chain(DISC_COLOURS);
@@ -67,9 +67,9 @@ impl Scene {
         [0, self.samples.len().saturating_sub(1)]
     }
 
-    /// What all pictures have in common.
+    /// What all frames have in common.
     pub fn backdrop(&self) -> Result<Picture, PictureError> {
-        // Encoders of films take even heights only.
+        // Encoders of videos take even heights only.
         let height = (f64::from(CAPTION_PX) + height_px(WIDTH_PX)) as u32;
         let mut drawing = Drawing::new(WIDTH_PX, height.next_multiple_of(2), GROUND);
         drawing.elements(&table_parts::begin(WIDTH_PX, &place()));
@@ -78,10 +78,10 @@ impl Scene {
         Picture::draw(&drawing)
     }
 
-    /// The picture after a number of control steps.
-    pub fn picture(&self, backdrop: &Picture, sample: usize) -> Result<Picture, PictureError> {
-        let mut picture = backdrop.clone();
-        let [width, height] = picture.size();
+    /// The frame after a number of control steps.
+    pub fn frame(&self, backdrop: &Picture, sample: usize) -> Result<Picture, PictureError> {
+        let mut frame = backdrop.clone();
+        let [width, height] = frame.size();
         let mut drawing = Drawing::transparent(width, height);
         let baseline = f64::from(CAPTION_PX) - 22.0;
         let time = (self.clock)(sample);
@@ -91,8 +91,8 @@ impl Scene {
         let caption = CAPTION.truncated(self.caption(sample), room);
         drawing.text(&caption, &CAPTION, [MARGIN_PX, baseline], Align::Left);
         drawing.elements(&self.bodies(sample));
-        picture.draw_over(&drawing)?;
-        Ok(picture)
+        frame.draw_over(&drawing)?;
+        Ok(frame)
     }
 
     fn caption(&self, sample: usize) -> &str {
@@ -130,7 +130,7 @@ impl Scene {
     }
 }
 
-/// Where the table is in a picture.
+/// Where the table is in a frame.
 fn place() -> String {
     format!("y=\"{CAPTION_PX}\"")
 }
