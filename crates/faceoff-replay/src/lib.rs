@@ -10,6 +10,7 @@ mod analysis;
 mod clip;
 mod clip_index;
 mod column;
+mod end_reasons;
 mod episode;
 mod error;
 mod game;
@@ -30,9 +31,8 @@ pub use analysis::*;
 pub use clip::Clip;
 pub use clip_index::{ClipIndex, EpisodeLine, TimeBins, ViolationSummary};
 pub use column::Column;
+pub use end_reasons::*;
 pub use error::ReplayError;
-/// Beginnings of the descriptions in [`EpisodeLine::why`].
-pub use faceoff_airhockey::{LOST_PUCK, OWN_GOAL, SLOW_GOAL};
 pub use game::{CHUNK_STEPS, GameClipRecorder};
 pub use group::Group;
 pub use header::{

@@ -5,7 +5,7 @@ use crate::{accept, problem::Problem, shared_cache::SharedCache};
 use axum::{
     body::{self, Body, Bytes},
     extract::Request,
-    http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header},
+    http::{Extensions, HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header},
     response::{IntoResponse, Response},
 };
 use faceoff_api::paths::API_BASE;
@@ -63,6 +63,8 @@ pub struct CachedResponse {
     status: StatusCode,
     headers: HeaderMap,
     body: Bytes,
+    /// Marks for outer layers.
+    extensions: Extensions,
 }
 
 impl CachedResponse {
@@ -73,6 +75,7 @@ impl CachedResponse {
                 status: parts.status,
                 headers: parts.headers,
                 body,
+                extensions: parts.extensions,
             },
             Err(error) => {
                 let problem = Problem::internal(format_args!("reading a response: {error}"));
@@ -81,6 +84,7 @@ impl CachedResponse {
                     status: parts.status,
                     headers: parts.headers,
                     body: Bytes::new(),
+                    extensions: parts.extensions,
                 }
             }
         }
@@ -97,6 +101,7 @@ impl IntoResponse for CachedResponse {
         let mut response = Response::new(Body::from(self.body));
         *response.status_mut() = self.status;
         *response.headers_mut() = self.headers;
+        *response.extensions_mut() = self.extensions;
         response
     }
 }

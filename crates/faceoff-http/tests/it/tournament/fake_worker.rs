@@ -19,6 +19,8 @@ pub struct GameOutcome {
     pub goals: [u32; 2],
     pub fouls: [u32; 2],
     pub penalty_points: [f64; 2],
+    /// Parts of 500 control steps in which penalty points are counted; 90 in a whole game.
+    pub windows: u32,
     pub forfeits: [bool; 2],
 }
 
@@ -29,6 +31,7 @@ impl GameOutcome {
             goals: [home, away],
             fouls: [0; 2],
             penalty_points: [10.0, 20.0],
+            windows: 90,
             forfeits: [false; 2],
         }
     }
@@ -44,8 +47,7 @@ impl GameOutcome {
 
     /// The score as a slot commits it. Numbers that do not follow from the outcome are arbitrary.
     pub fn score(self, agents: [&str; 2], seed: Seed) -> Value {
-        // A game has 90 windows of 500 control steps, in which penalty points are counted.
-        let windows = 90;
+        let windows = self.windows;
         let forfeits = self
             .forfeits
             .map(|forfeits| forfeits.then_some(Forfeit::Faults));

@@ -209,10 +209,10 @@ async fn forfeit_counts_ten_to_zero() {
     let cup = TestTournament::open(&["A", "B"], json!({})).await;
     cup.start_round().await;
     let outcome = GameOutcome {
-        goals: [2, 4],
         fouls: [3, 7],
         penalty_points: [136.0, 0.0],
         forfeits: [false, true],
+        ..GameOutcome::goals(2, 4)
     };
     cup.play(|_, _| outcome).await;
     let game = cup.games().await.remove(0);

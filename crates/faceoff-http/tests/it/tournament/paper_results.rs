@@ -27,11 +27,10 @@ fn paper_outcome(golden: &Value, round: u32, [home, away]: [&str; 2]) -> GameOut
         let pair_of = |field: &str| [number(&game[field][0]), number(&game[field][1])];
         let (goals, score) = (pair_of("goals"), pair_of("score"));
         GameOutcome {
-            goals,
             // The tables have the final score only. It includes a point for every third foul of the opponent.
             fouls: [3 * (score[1] - goals[1]), 3 * (score[0] - goals[0])],
             penalty_points: [0, 1].map(|side| game["penalty_points"][side].as_f64().unwrap()),
-            forfeits: [false; 2],
+            ..GameOutcome::goals(goals[0], goals[1])
         }
     };
     match (find(home, away), find(away, home)) {

@@ -1,0 +1,3 @@
+//! Beginnings of the descriptions in [`crate::EpisodeLine::why`].
+
+pub use faceoff_airhockey::{LOST_PUCK, OWN_GOAL, SLOW_GOAL};
