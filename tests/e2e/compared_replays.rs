@@ -21,6 +21,18 @@ const HANDHELD: View = View {
     ..View::DESKTOP
 };
 
+/// The first request for the second replay's motion fails.
+const FAIL_SECOND_REPLAY_ONCE: &str = "
+    const original = window.fetch;
+    let hasFailed = false;
+    window.fetch = (address, options) => {
+        const isSecond = address === document.querySelector('#replay-b')?.dataset.motion;
+        if (!isSecond || hasFailed) return original.call(window, address, options);
+        hasFailed = true;
+        return Promise.reject(new TypeError('the network is down'));
+    };
+";
+
 /// Starts a server and waits for the evaluations of two teams. Returns the server and the path of the page that compares them.
 pub fn compared_evaluations(scratch: &Path, agents: [&str; 2]) -> (Server, String) {
     let server = Server::start(&scratch.join("data"), CONFIG);
@@ -175,9 +187,28 @@ fn two_episodes_are_drawn_on_one_table() {
     assert_eq!(page.console_errors(), [""; 0]);
 
     link_shows_one_table(&browser, &server, &url);
+    link_to_one_table_waits_for_a_late_replay(&browser, &server, &url);
     let without_scripts = browser.open_in(View::DESKTOP.without_scripts(), &url);
     let stills = without_scripts.evaluate("document.querySelectorAll('.still svg').length");
     assert_eq!(stills, 2);
+}
+
+/// The second replay is loaded at its second attempt only.
+fn link_to_one_table_waits_for_a_late_replay(browser: &Browser, server: &Server, url: &str) {
+    let page = browser.open_in(View::DESKTOP, &format!("{}/", server.url));
+    page.before_scripts(FAIL_SECOND_REPLAY_ONCE);
+    page.go_to(&format!("{url}#t=9&ghost=1"));
+    page.wait_for("#replay-a[data-state=ready]");
+    page.wait_for("#replay-b[data-state=failed]");
+    assert_eq!(
+        page.evaluate("document.querySelector('.one-table') === null"),
+        true
+    );
+    let _ = page.evaluate(
+        "[...document.querySelectorAll('#replay-b button')].find(button => button.textContent == 'Try again').click()",
+    );
+    page.wait_for(".one-table #replay-b[data-state=ready]");
+    assert_eq!(page.evaluate(&format!("{ONE_TABLE_BOX}.checked")), true);
 }
 
 /// On a phone, for a visitor who prefers reduced motion.
