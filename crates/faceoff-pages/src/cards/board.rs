@@ -1,7 +1,7 @@
 //! Cards of the boards: the first teams.
 
 use super::{
-    layout::{Card, LEFT, RIGHT, Share, text_style},
+    layout::{Card, LEFT, RIGHT, Share, legible, text_style, tier_style},
     response::respond,
 };
 use crate::{board_status::shared_rank, frame::PageProblem};
@@ -24,6 +24,7 @@ const FIRST_ROW: f64 = 254.0;
 const ROW_HEIGHT: f64 = 80.0;
 /// Left end of the names.
 const NAMES: f64 = 150.0;
+const NAME_WIDTH: f64 = 380.0;
 
 type BoardQueryParams = Result<QueryParams<BoardPageQuery>, Problem>;
 
@@ -84,7 +85,13 @@ fn draw_rows(card: &mut Card, board: &BoardView) {
             None => Share::of_score(row.score, &row.tasks, &board.weights),
         };
         card.text(&shared_rank(&board.rows, row), &rank, [LEFT, y], 80.0);
-        card.text(row.team.as_str(), &name, [NAMES, y], 520.0);
+        let team = name.truncated(legible(row.team.as_str()), NAME_WIDTH);
+        card.text(&team, &name, [NAMES, y], NAME_WIDTH);
+        // Tiers precede scores in the ranking.
+        if let Some(tier) = row.tier {
+            let x = NAMES + name.width_px(&team) + 24.0;
+            card.text(tier.title(), &tier_style(tier, 28.0), [x, y], 260.0);
+        }
         let percent = format!("{} %", share.percent());
         card.text_at_end(&percent, &name, [RIGHT - 240.0, y], 220.0);
         card.text_at_end(&share.interval(), &interval, [RIGHT, y], 220.0);

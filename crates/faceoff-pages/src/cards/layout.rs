@@ -26,6 +26,16 @@ pub(super) struct Card {
     drawing: Drawing,
 }
 
+/// The style of the title of a tier.
+pub(super) fn tier_style(tier: Tier, size_px: f64) -> TextStyle {
+    let colour_name = match tier {
+        Tier::Deployable => "good",
+        Tier::Improvable => "fair",
+        Tier::NonDeployable => "poor",
+    };
+    text_style(Weight::Semibold, size_px, colour_name)
+}
+
 /// The style of a text in a colour of the pages.
 pub(super) fn text_style(weight: Weight, size_px: f64, colour_name: &str) -> TextStyle {
     TextStyle::new(weight, size_px, colour(colour_name))
@@ -134,13 +144,7 @@ impl Card {
             500.0,
         );
         if let Some(tier) = tier {
-            let tier_colour = match tier {
-                Tier::Deployable => "good",
-                Tier::Improvable => "fair",
-                Tier::NonDeployable => "poor",
-            };
-            let style = text_style(Weight::Semibold, 40.0, tier_colour);
-            self.text(tier.title(), &style, [LEFT, 570.0], 500.0);
+            self.text(tier.title(), &tier_style(tier, 40.0), [LEFT, 570.0], 500.0);
         }
     }
 
@@ -186,7 +190,7 @@ impl Card {
 }
 
 /// The text, or a replacement if the fonts have none of its characters.
-fn legible(text: &str) -> &str {
+pub(super) fn legible(text: &str) -> &str {
     match is_legible(text) {
         true => text,
         false => "(name in another script)",

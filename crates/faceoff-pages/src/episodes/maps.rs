@@ -12,7 +12,8 @@ use faceoff_types::Task;
 /// Largest number of marks of a map that are links: beyond, they would overlap, and make the page large.
 const MAX_LINKS: usize = 300;
 
-const TOO_MANY_LINKS: &str = "select fewer episodes to open replays from here";
+const ALL_LINKS: &str = "A click on a mark opens the replay.";
+const TOO_MANY_LINKS: &str = "Select fewer episodes to open replays from here.";
 
 /// A link to the replay of an episode, around its mark on a map.
 pub(super) struct EpisodeLink {
@@ -106,8 +107,8 @@ impl StartMap {
             failed_count: failed.len(),
             links: links.collect(),
             note: match (has_all, has_failed) {
-                (true, _) => "a click on a mark opens the replay",
-                (false, true) => "a click on a cross opens the replay",
+                (true, _) => ALL_LINKS,
+                (false, true) => "A click on a cross opens the replay.",
                 (false, false) => TOO_MANY_LINKS,
             },
             tables: [
@@ -208,7 +209,7 @@ impl ViolationMap {
         });
         let mut links: Vec<_> = links.take(MAX_LINKS + 1).collect();
         let note = match links.len() {
-            0..=MAX_LINKS => "a click on a mark opens the replay",
+            0..=MAX_LINKS => ALL_LINKS,
             _ => TOO_MANY_LINKS,
         };
         if links.len() > MAX_LINKS {
