@@ -65,7 +65,7 @@ case ${1:-} in
             rm -rf "$target/python-version"
             "$interpreter" -m venv "$target/python-version"
             # Of the libraries, those that have a wheel for this version; tests of the others are skipped.
-            sed 's/ *#.*//' "$here/requirements-test.txt" | while read -r requirement; do
+            sed 's/ *#.*//; /^$/d' "$here/requirements-test.txt" | while read -r requirement; do
                 log=$target/python-version/$requirement.log
                 "$target/python-version/bin/python" -m pip install --quiet --disable-pip-version-check --no-compile \
                     --only-binary :all: "$requirement" > "$log" 2>&1 && continue
