@@ -63,7 +63,7 @@ impl Card {
         self.drawing
     }
 
-    /// A text from `position` on, truncated to its width. A text of which no letter can be drawn is left out.
+    /// A text from `position` on, truncated to its width. A text of which no letter can be drawn is replaced.
     pub(super) fn text(&mut self, text: &str, style: &TextStyle, position: [f64; 2], width: f64) {
         self.aligned_text(text, style, position, width, Align::Left);
     }
