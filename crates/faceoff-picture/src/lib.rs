@@ -6,6 +6,7 @@
 mod animation;
 mod canvas;
 mod font;
+mod hypotenuse;
 mod pixels;
 pub mod text;
 
