@@ -35,7 +35,7 @@ fn stage_refuses_other_runtimes_and_names_accepted_ones() {
     let args = ["stage", "change", "Qualifying", "--runtimes"];
     admin(&server, &args).expect_refusal(USAGE_ERROR, &["--runtimes"]);
     let unconfirmed = admin(&server, &[&args[..], &["native"]].concat());
-    unconfirmed.expect_refusal(REFUSED, &["new rules begin revision 2", "“confirm”"]);
+    unconfirmed.expect_refusal(REFUSED, &["new rules will begin revision 2", "“confirm”"]);
 
     let team = Team::create(&server, "Alpha");
     let python = python_bundle(scratch.path(), "python", &python_agent("say(hold)"));

@@ -1,7 +1,7 @@
 //! Frame of the team dashboard and the organiser dashboard: tabs, notices, style and script.
 
 use super::{
-    assets,
+    assets, figures,
     frame::{PageProblem, render},
 };
 use askama::Template;
@@ -86,7 +86,7 @@ impl From<&Problem> for Refusal {
     fn from(problem: &Problem) -> Self {
         Self {
             title: problem.kind().title(),
-            detail: problem.detail().to_owned(),
+            detail: figures::sentence(problem.detail()),
             slug: problem.kind().slug(),
         }
     }
@@ -133,7 +133,8 @@ const DONE_TEXTS: &[(&str, &str)] = &[
     ("uninvited", "Invitation revoked. The link no longer works."),
     (
         "removed",
-        "User removed. All tokens and sessions are revoked; team tokens, invitations and webhooks that the user had made have ended.",
+        "User removed. All tokens and sessions of the user are revoked. Team tokens and invitations made by the user are revoked, and \
+         webhooks disabled.",
     ),
     ("asked", "Question sent. The answer appears below."),
     ("announced", "Announcement published."),

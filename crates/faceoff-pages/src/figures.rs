@@ -100,6 +100,15 @@ pub(super) fn expiry_state(
     Some(format!("{state} {}", utc_minute(at)))
 }
 
+/// A detail of a problem as sentences, with a capital letter and a full stop.
+pub(super) fn sentence(detail: &str) -> String {
+    let mut letters = detail.chars();
+    let first = letters.next().into_iter().flat_map(char::to_uppercase);
+    let mut text: String = first.chain(letters).collect();
+    text.push('.');
+    text
+}
+
 /// A non-negative value with two significant digits.
 pub(super) fn two_significant_digits(value: f64) -> String {
     let decimals = match value {

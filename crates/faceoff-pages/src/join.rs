@@ -1,6 +1,7 @@
 //! `/join/CODE`: accepting an invitation. The code is the secret of the link.
 
 use super::{
+    figures,
     frame::{Frame, PageProblem, render},
     sign_in::redirect_to_dashboard,
 };
@@ -186,7 +187,7 @@ pub(super) async fn submit(
         }
         Err(PageProblem(problem)) if problem.kind().status().is_client_error() => {
             let status = problem.kind().status();
-            let error = Some(problem.detail().to_owned());
+            let error = Some(figures::sentence(problem.detail()));
             let page = page_with(&app, &code, form, error).await?;
             Ok((status, page).into_response())
         }

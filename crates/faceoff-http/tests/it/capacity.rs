@@ -106,8 +106,8 @@ async fn forecast_reports_a_day_that_will_not_fit() {
         "31.2 hours",
         "1.0 hours",
         "does not fit",
-        "do not count",
-        "more slots",
+        "will not count",
+        "More slots",
     ] {
         assert!(summary.contains(words), "{words} is not in {summary}");
     }

@@ -89,6 +89,6 @@ async fn overfull_day_is_logged_once_and_again_at_its_cutoff() {
             assert!(line.contains(part), "{part:?} is not in {line}");
         }
     }
-    assert!(lines[0].contains("1 team would have 3000"), "{}", lines[0]);
+    assert!(lines[0].contains("1 team will have 3000"), "{}", lines[0]);
     assert!(lines[1].contains("1 team has 3000"), "{}", lines[1]);
 }

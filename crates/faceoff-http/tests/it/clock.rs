@@ -107,7 +107,7 @@ async fn organiser_accepts_a_clock_step() {
         "nothing is done yet",
         "86400 s ahead",
         "2026-03-02T10:00:00Z",
-        "cutoffs",
+        "Cutoffs",
     ];
     post(json!({})).await.problem(409, "not-confirmed", &effect);
     // A step that came after the organiser had looked is not accepted.

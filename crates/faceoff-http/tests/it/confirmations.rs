@@ -49,7 +49,12 @@ async fn voided_evaluation_leaves_the_board_with_its_reason() {
     site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
         .await;
     assert_eq!(board_teams(&site).await, json!(["Alpha"]));
-    let words = ["Alpha", "2026-03-01", "disappear from the boards", "rerun"];
+    let words = [
+        "Alpha",
+        "2026-03-01",
+        "disappear from the boards",
+        "repeated",
+    ];
     let voided = confirm_decision(&site, &format!("{path}/void"), "Alpha", &words).await;
     assert_eq!(
         voided["voided"],
@@ -84,7 +89,7 @@ async fn voided_day_voids_or_cancels_all_its_evaluations() {
         .await;
     let stage = site.stage().await;
     let path = format!("/api/v1/stages/{stage}/days/2026-03-01/void");
-    let words = ["1 evaluations of 2026-03-01", "1 unfinished ones"];
+    let words = ["1 evaluation of 2026-03-01", "1 unfinished evaluation"];
     let day = confirm_decision(&site, &path, "2026-03-01", &words).await;
     let states: Vec<_> = day["created"]
         .as_array()
@@ -126,7 +131,7 @@ async fn disqualified_team_leaves_the_board_with_the_reason() {
         &site,
         &path,
         "Alpha",
-        &["Alpha", "all boards", "1 of its unfinished evaluations"],
+        &["Alpha", "all boards", "1 unfinished evaluation"],
     )
     .await;
     assert_eq!(view["disqualified"]["reason"], REASON);

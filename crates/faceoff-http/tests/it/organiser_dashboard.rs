@@ -107,7 +107,7 @@ async fn evaluation_is_voided_with_a_reason_and_rerun() {
     );
     assert!(
         texts(&html, "#effects")[0]
-            .starts_with("The evaluation of 2026-03-01 by Alpha would disappear")
+            .starts_with("The evaluation of 2026-03-01 by Alpha will disappear")
     );
     assert_eq!(
         newest_event(&site, "evaluation_voided").await,
@@ -168,7 +168,7 @@ async fn organiser_starts_and_corrects_days_and_pauses_the_queue() {
     let (link, page) = open_decision(&mut grace, "/organiser/day", "start-day/").await;
     let effects = texts(&dashboard_page(&page, 200), "#effects").remove(0);
     assert!(
-        effects.contains("1 team would have 12 episodes to run"),
+        effects.contains("1 team will have 12 episodes to run"),
         "{effects}"
     );
     assert!(redirect_target(&grace.submit(&link, &[]).await).ends_with("done=started"));
@@ -205,7 +205,7 @@ async fn organiser_starts_and_corrects_days_and_pauses_the_queue() {
     let unconfirmed = [("reason", "all of it")];
     let (link, _) = open_decision(&mut grace, "/organiser/day", "void-day/").await;
     let refused = dashboard_page(&grace.submit(&link, &unconfirmed).await, 409);
-    assert!(texts(&refused, "[role=alert]")[0].contains("nothing is done yet"));
+    assert!(texts(&refused, "[role=alert]")[0].contains("Nothing is done yet"));
     let confirmed = [("reason", "all of it"), ("confirm", "2026-03-01")];
     assert!(redirect_target(&grace.submit(&link, &confirmed).await).ends_with("done=day-voided"));
     site.set_time("2026-03-04T10:00:00Z".parse().unwrap());
@@ -276,7 +276,7 @@ async fn organiser_approves_changes_and_disqualifies_teams() {
     for id in ids(&html) {
         let approve = format!("/organiser/decide/approve/{id}");
         let page = dashboard_page(&grace.open(&approve).await, 200);
-        if texts(&page, "h1")[0] == "Approve Alpha" {
+        if texts(&page, "h1")[0] == "Approve the registration of Alpha" {
             assert!(redirect_target(&grace.submit(&approve, &[]).await).ends_with("done=approved"));
         } else {
             let refuse = format!("/organiser/decide/refuse/{id}");
@@ -316,7 +316,7 @@ async fn organiser_approves_changes_and_disqualifies_teams() {
     let (link, page) = open_decision(&mut grace, "/organiser/teams", "disqualify/").await;
     assert!(
         texts(&dashboard_page(&page, 200), "#effects")[0]
-            .starts_with("Alpha would disappear from all boards")
+            .starts_with("Alpha will disappear from all boards")
     );
     let fields = [("reason", "it read the seed"), ("confirm", "Alpha")];
     assert!(redirect_target(&grace.submit(&link, &fields).await).ends_with("done=disqualified"));
@@ -702,7 +702,7 @@ async fn log_is_sentences_with_names() {
     for sentence in [
         "Grace disqualified Alpha: it read the <b>seed</b>",
         "Grace joined as an organiser",
-        "The host’s administrator created the team Beta",
+        "The administrator of the host created the team Beta",
         "Alpha’s submission valid: agent “agent”",
         "queued Alpha’s evaluation of 2026-03-01",
     ] {
@@ -768,7 +768,7 @@ async fn day_has_one_primary_action() {
         let html = dashboard_page(&grace.open("/organiser/day").await, 200);
         texts(&html, ".primary-action")
     };
-    assert_eq!(primary().await, ["Start today’s evaluation"]);
+    assert_eq!(primary().await, ["Start today’s evaluation day"]);
     let pause = json!({ "reason": "a test" });
     let paused = site.post("/api/v1/queue/pause", Some(ADMIN), &pause).await;
     assert_eq!(paused.status, 204);

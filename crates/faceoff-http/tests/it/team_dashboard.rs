@@ -177,10 +177,10 @@ async fn invalid_archive_is_refused_on_the_page() {
             "notes.txt",
             b"not an archive".as_slice(),
             415,
-            "expected a .tar.gz",
+            "Expected a .tar.gz",
         ),
         ("empty.zip", b"".as_slice(), 400, "got an empty body"),
-        ("", b"".as_slice(), 400, "no file was chosen"),
+        ("", b"".as_slice(), 400, "No file was chosen"),
     ] {
         let refused = ada.upload("/dashboard/upload", file_name, bundle).await;
         let html = dashboard_page(&refused, status);
@@ -385,7 +385,7 @@ async fn member_invites_revokes_an_invitation_and_leaves() {
     let refused = ada.submit(&remove("Ben"), &[("confirm", "Ben")]).await;
     assert_eq!(refused.status, 403);
     let wrong = ben.submit(&remove("Ben"), &[("confirm", "Ada")]).await;
-    assert!(first_text(&wrong, "[role=alert]").contains("nothing is done yet"));
+    assert!(first_text(&wrong, "[role=alert]").contains("Nothing is done yet"));
     let left = ben.submit(&remove("Ben"), &[("confirm", "Ben")]).await;
     assert_eq!(left.status, 303);
     assert_eq!(

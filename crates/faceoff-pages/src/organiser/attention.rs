@@ -8,7 +8,7 @@ use super::{
 use crate::{
     board_status,
     dashboard_frame::{self, DashboardHeader, DoneQuery, Notice},
-    figures::utc_minute,
+    figures::{self, utc_minute},
     frame::{Frame, PageProblem, render},
     page_auth::PageOrganiser,
 };
@@ -90,14 +90,14 @@ async fn server_items(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Prob
                         ruling.reason,
                         health.waiting
                     ),
-                    links: vec![("/organiser/decide/resume".into(), "Resume".into())],
+                    links: vec![("/organiser/decide/resume".into(), "Resume the queue".into())],
                 });
             }
         }
         Err(problem) => items.push(Item {
             class: "bad",
             title: problem.kind().title().to_owned(),
-            detail: format!("{}.", problem.detail()),
+            detail: figures::sentence(problem.detail()),
             links: vec![("/organiser/storage".into(), "Storage".into())],
         }),
     }
@@ -105,8 +105,11 @@ async fn server_items(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Prob
         items.push(Item {
             class: "bad",
             title: format!("The system clock is {}", step.size()),
-            detail: format!("{step}."),
-            links: vec![("/organiser/decide/accept-clock".into(), "Accept it".into())],
+            detail: figures::sentence(&step.to_string()),
+            links: vec![(
+                "/organiser/decide/accept-clock".into(),
+                "Accept the clock".into(),
+            )],
         });
     }
     for ban in app.store.worker_bans().await? {
@@ -121,7 +124,7 @@ async fn server_items(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Prob
     for alarm in workers.alarms {
         items.push(Item {
             class: "waiting",
-            title: "A job on a remote worker takes long".to_owned(),
+            title: "A job on a remote worker is taking long".to_owned(),
             detail: format!("{alarm}."),
             links: vec![("/organiser/workers".into(), "Workers".into())],
         });
@@ -141,7 +144,7 @@ async fn server_items(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Prob
         {
             items.push(Item {
                 class: "waiting",
-                title: format!("{} has used up most of its upload quota", team.team_name),
+                title: format!("{} has used up most of its storage quota", team.team_name),
                 detail: format!(
                     "{} of {} used by bundles.",
                     dashboard_frame::bytes(team.bundle_bytes),
@@ -179,12 +182,12 @@ async fn wrong_passwords(app: &App) -> Result<Option<Item>, Problem> {
         class: "waiting",
         title: "Many wrong passwords".to_owned(),
         detail: format!(
-            "{} within about an hour: {}. After five wrong ones, sign-ins with a name have to wait; tokens, sessions and new \
-             links work.",
+            "{} within about an hour: {}. After five wrong passwords for a name, sign-ins with that name have to wait. Tokens, \
+             sessions and new links still work.",
             wrong.total(),
             names.join(", ")
         ),
-        links: vec![("/organiser/access".into(), "Accounts".into())],
+        links: vec![("/organiser/access".into(), "Users and tokens".into())],
     }))
 }
 
@@ -270,11 +273,11 @@ async fn failures(app: &App, day: StageDay) -> Result<Vec<Item>, Problem> {
         Some(Item {
             class: "bad",
             title: format!("{}’s evaluation of {} {outcome}", view.team_name, view.day),
-            detail: format!("{reason}."),
+            detail: figures::sentence(&reason),
             links: vec![
                 (
                     format!("/organiser/decide/rerun/{}", view.id),
-                    "Repeat it".into(),
+                    "Repeat the evaluation".into(),
                 ),
                 (
                     format!("/organiser/day?stage={}&day={}", day.stage, day.date),
@@ -293,8 +296,8 @@ async fn stage_items(app: &App, stage: Stage) -> Result<(Vec<Item>, StageSummary
     if phase == StagePhase::Open && app.store.archived_season().is_none() {
         for forecast in capacity::build(app, stage.id).await?.days {
             let (class, title) = match forecast.fit {
-                Fit::Not => ("bad", "does not fit before its deadline"),
-                Fit::Unknown => ("waiting", "may not fit before its deadline"),
+                Fit::Not => ("bad", "will not finish before its deadline"),
+                Fit::Unknown => ("waiting", "may not finish before its deadline"),
                 Fit::Probably | Fit::Surely => continue,
             };
             items.push(Item {
@@ -327,7 +330,7 @@ async fn stage_items(app: &App, stage: Stage) -> Result<(Vec<Item>, StageSummary
             detail: "It was started when the clock was ahead. No other day starts until its date has passed, unless you \
                      void it."
                 .to_owned(),
-            links: vec![(format!("/organiser/decide/void-day/{day}"), "Void it".into())],
+            links: vec![(format!("/organiser/decide/void-day/{day}"), "Void the day".into())],
         });
     }
     let latest = app

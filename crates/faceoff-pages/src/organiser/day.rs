@@ -69,7 +69,7 @@ impl Page {
         }
         if self.can_start {
             let path = format!("/organiser/decide/start-day/{stage}");
-            return Some((path, "Start today’s evaluation"));
+            return Some((path, "Start today’s evaluation day"));
         }
         self.was_missed.then(|| {
             let path = format!("/organiser/decide/missed-day/{stage}/{date}");
@@ -189,10 +189,14 @@ pub(super) async fn page(
         .into_iter()
         .map(|evaluation| row(evaluation, &replaced))
         .collect();
+    let reason = match day {
+        Some(_) => "no active submission at the cutoff",
+        None => "this day has had no cutoff",
+    };
     let without_submission = view.without_submission.into_iter();
     let mut excluded: Vec<_> = without_submission
         .filter(|team| team.retired_at.is_none() && team.disqualified.is_none())
-        .map(|team| (team.id, team.name, "no valid submission".to_owned()))
+        .map(|team| (team.id, team.name, reason.to_owned()))
         .collect();
     let excluded_teams = view.excluded.into_iter();
     excluded.extend(

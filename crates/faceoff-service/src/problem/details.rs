@@ -114,8 +114,9 @@ impl Problem {
         if confirmed == Some(name) {
             return Ok(());
         }
-        let detail =
-            format!("nothing is done yet: {effect}. To do it, send “confirm” with {name:?}");
+        let detail = format!(
+            "nothing is done yet: {effect}. To do it, confirm it with {name:?} (field “confirm”)"
+        );
         Err(Self::new(ProblemKind::NotConfirmed, detail).with("confirm", name))
     }
 

@@ -39,8 +39,8 @@ fn preview(step: &ClockStep) -> Preview {
     Preview {
         name: step.size(),
         effect: format!(
-            "{step}. If it is accepted, the server\u{2019}s time is {server_at:.0}; cutoffs, deadlines and closing times until then \
-             take effect at once and cannot be undone, leases and retries of jobs move with the clock"
+            "{step}. If you accept it, the server\u{2019}s time will be {server_at:.0}. Cutoffs, deadlines and closing times until \
+             then will take effect at once; this cannot be undone. Leases and retries of jobs will move with the clock"
         ),
     }
 }

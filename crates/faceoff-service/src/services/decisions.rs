@@ -22,7 +22,7 @@ pub fn checked_reason(reason: &str) -> Result<&str, Problem> {
 pub struct Preview {
     /// The name of the affected resource, which confirms the decision.
     pub name: String,
-    /// What the decision does, as a clause without a full stop.
+    /// What the decision will do, as one or more sentences; without the capital letter of the first and the full stop of the last.
     pub effect: String,
 }
 
@@ -36,10 +36,18 @@ impl Preview {
     }
 }
 
-/// A clause for the description of effects, which says that the reason is public; it quotes the reason if that is already known.
-pub fn reason_clause(reason: Option<&str>) -> String {
+/// A sentence for the description of effects, which says that the reason is public; it quotes the reason if that is already known.
+pub fn reason_sentence(reason: Option<&str>) -> String {
     match reason {
-        Some(reason) => format!("with the public reason {reason:?}"),
-        None => "with a public reason".to_owned(),
+        Some(reason) => format!("The reason is public: {reason:?}"),
+        None => "The reason is public".to_owned(),
+    }
+}
+
+/// A number of things, such as “3 evaluations”.
+pub fn count(number: u32, thing: &str) -> String {
+    match number {
+        1 => format!("1 {thing}"),
+        _ => format!("{number} {thing}s"),
     }
 }

@@ -1,7 +1,7 @@
 //! Departures of teams from a tournament: a team withdraws, or organisers withdraw or disqualify it.
 
 use super::{
-    decisions::{Preview, checked_reason, reason_clause},
+    decisions::{Preview, checked_reason, reason_sentence},
     entrants,
 };
 use crate::{
@@ -45,21 +45,21 @@ fn preview(state: &TournamentState, departure: &PlannedDeparture<'_>) -> Result<
         ));
     };
     let name = entrant.name.to_string();
-    let reason = reason_clause(departure.reason);
+    let reason = reason_sentence(departure.reason);
     let effect = if state.rounds.is_empty() {
         format!(
-            "{name} would leave the tournament, whose first round has not started. Its unfinished test and friendly games \
-             would be cancelled. It may enter again"
+            "{name} will leave the tournament, whose first round has not started. Its unfinished test and friendly games \
+             will be cancelled. It may enter again"
         )
     } else if state.tournament.rules.plays_on(departure.kind) {
         format!(
-            "{name} would be withdrawn for good, {reason}. Its games of a running round would still be played and count, and \
-             it would not play in later rounds. Its unfinished test and friendly games would be cancelled"
+            "{name} will be withdrawn for good. Its games of a running round will still be played and count, but it will not \
+             play in later rounds. Its unfinished test and friendly games will be cancelled. {reason}"
         )
     } else {
         let (outcome, rank) = match departure.kind {
             DepartureKind::Withdrawn => ("withdrawn", ""),
-            DepartureKind::Disqualified => ("disqualified", ", and would rank below all others"),
+            DepartureKind::Disqualified => ("disqualified", " and will rank below all others"),
         };
         let earlier_rounds = match departure.from_round {
             Some(round) => format!(", and of all rounds from {round} on,"),
@@ -73,8 +73,8 @@ fn preview(state: &TournamentState, departure: &PlannedDeparture<'_>) -> Result<
                 )
         });
         format!(
-            "{name} would be {outcome} for good, {reason}{rank}. {} of its games, and its unfinished test and friendly games, \
-             would be cancelled. Its games of the running or next round{earlier_rounds} would not count",
+            "{name} will be {outcome} for good{rank}. {} of its games, and its unfinished test and friendly games, will be \
+             cancelled. Its games of the running or next round{earlier_rounds} will not count. {reason}",
             open_games.count()
         )
     };

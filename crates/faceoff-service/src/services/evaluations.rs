@@ -1,7 +1,7 @@
 //! Evaluation days and evaluations that an organiser starts, cancels or reruns. At the cutoff of an *evaluation day* the
 //! server starts one *evaluation* for each team: it runs all tasks of the day with the team's active submission.
 
-use super::decisions::{Preview, checked_reason, reason_clause};
+use super::decisions::{Preview, checked_reason, reason_sentence};
 use crate::{
     app::AppState,
     boxed,
@@ -127,12 +127,12 @@ pub async fn preview_extra_evaluation(
     });
     Ok(replaced.map(|replaced| Preview {
         effect: format!(
-            "{} has an evaluation of {} that counts ({}). It would be voided at once, {}, and the team's active submission \
-             evaluated in its place",
+            "{} has an evaluation of {} that counts ({}). It will be voided at once, and the team's active submission will be \
+             evaluated in its place. {}",
             team.name,
             stage_day.date,
             replaced.id,
-            reason_clause(reason)
+            reason_sentence(reason)
         ),
         name: team.name.to_string(),
     }))

@@ -1,6 +1,6 @@
 //! Decisions of organisers about games of a round: voiding a result, and rerunning a game.
 
-use super::decisions::{Preview, checked_reason, reason_clause};
+use super::decisions::{Preview, checked_reason, reason_sentence};
 use crate::{
     app::AppState,
     boxed,
@@ -28,9 +28,9 @@ pub async fn preview_void_game(
     let (state, game) = game::find_visible(app, Viewer::Organiser, id).await?;
     let name = pairing_name(&state, &game)?;
     let effect = format!(
-        "the result of {name} would be voided at once, {}; the next round would wait until the game is rerun, with the same \
-         seed and submissions",
-        reason_clause(reason)
+        "the result of {name} will be voided at once. The next round will wait until the game is rerun with the same seed \
+         and submissions. {}",
+        reason_sentence(reason)
     );
     Ok(Preview { name, effect })
 }

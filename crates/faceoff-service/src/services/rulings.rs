@@ -1,7 +1,7 @@
 //! Decisions of organisers about results, teams and the queue: voiding an evaluation or a day, pausing the queue, and
 //! disqualifying a team. A *voided* evaluation no longer counts on any board.
 
-use super::decisions::{Preview, checked_reason, reason_clause};
+use super::decisions::{Preview, checked_reason, count, reason_sentence};
 use crate::{
     app::AppState,
     boxed,
@@ -22,10 +22,10 @@ pub async fn preview_void_evaluation(
     let visibility = Visibility::for_organiser(app).await?;
     let view = evaluation::find(app, &visibility, id).await?;
     let effect = format!(
-        "the evaluation of {} by {} would disappear from the boards for good, {}; it can be rerun",
+        "the evaluation of {} by {} will disappear from the boards for good. It can be repeated. {}",
         view.day,
         view.team_name,
-        reason_clause(reason)
+        reason_sentence(reason)
     );
     let name = view.team_name.to_string();
     Ok(Preview { name, effect })
@@ -64,10 +64,18 @@ pub async fn preview_void_day(
             state => open_count += u32::from(!state.is_over()),
         }
     }
+    let cancelled = match open_count {
+        0 => String::new(),
+        open_count => format!(
+            " {} will be cancelled.",
+            count(open_count, "unfinished evaluation")
+        ),
+    };
     let effect = format!(
-        "{ended_count} evaluations of {} would disappear from the boards for good and {open_count} unfinished ones be cancelled, {}",
+        "{} of {} will disappear from the boards for good.{cancelled} {}",
+        count(ended_count, "evaluation"),
         stage_day.date,
-        reason_clause(reason)
+        reason_sentence(reason)
     );
     let name = stage_day.date.to_string();
     Ok(Preview { name, effect })
@@ -121,12 +129,14 @@ pub async fn preview_disqualification(
     let open = team_evaluations
         .iter()
         .filter(|evaluation| !evaluation.state.is_over());
+    let open = match u32::try_from(open.count()).unwrap_or(u32::MAX) {
+        0 => "It has no unfinished evaluations".to_owned(),
+        open => format!("{} will be cancelled", count(open, "unfinished evaluation")),
+    };
     let effect = format!(
-        "{} would disappear from all boards, {} of its unfinished evaluations be cancelled, and it could neither upload nor \
-         be evaluated until it is reinstated, {}",
+        "{} will disappear from all boards, and can neither upload nor be evaluated until you reinstate it. {open}. {}",
         team.name,
-        open.count(),
-        reason_clause(reason)
+        reason_sentence(reason)
     );
     let name = team.name.to_string();
     Ok(Preview { name, effect })

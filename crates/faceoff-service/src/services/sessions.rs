@@ -46,7 +46,7 @@ pub async fn sign_in(
     let wrong = || {
         Problem::new(
             ProblemKind::Unauthenticated,
-            "wrong name or password; if you have lost it, ask an organiser for a new link",
+            "wrong name or password. Lost your password? Ask an organiser for a new link",
         )
     };
     let (id, stored) = verified.await?.zip(stored).ok_or_else(wrong)?;

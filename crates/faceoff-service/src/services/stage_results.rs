@@ -69,8 +69,8 @@ pub async fn preview_sign_off(app: &AppState, id: StageId) -> Result<Preview, Pr
     let stage = app.store.check_can_sign_off(id, now).await?;
     let name = stage.name.to_string();
     let effect = format!(
-        "the result of the stage {name:?} would be signed off for good. None of its evaluations could be voided or rerun, \
-         none of its settings changed, and later disqualifications or reinstatements would not affect its boards"
+        "the result of the stage {name:?} will be signed off for good. Its evaluations can no longer be voided or repeated, \
+         and its settings can no longer be changed. Later disqualifications or reinstatements will not affect its boards"
     );
     Ok(Preview { name, effect })
 }

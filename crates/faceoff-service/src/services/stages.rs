@@ -191,8 +191,8 @@ async fn retention_effect(
         ),
     };
     Ok(Some(format!(
-        "the stage {:?} would keep {retention}; {} datasets of {} teams and {} bundles of submissions that are no longer \
-         used ({} bytes{unmeasured_clause}) would be removed for good, {time_clause}, but only once nothing of the stage is running, \
+        "the stage {:?} will keep {retention}; {} datasets of {} teams and {} bundles of submissions that are no longer \
+         used ({} bytes{unmeasured_clause}) will be removed for good, {time_clause}, but only once nothing of the stage is running, \
          undecided or blind; results stay",
         stage.name.as_str(),
         removal.datasets,
@@ -205,15 +205,15 @@ async fn retention_effect(
 fn new_revision_effect(stage: &Stage) -> String {
     let number = stage.rules.number;
     format!(
-        "new rules begin revision {} with an empty board; results of revision {number} stay on their own board; this \
-         cannot be undone",
+        "the new rules will begin revision {} with an empty board; results of revision {number} stay on their own board; \
+         this cannot be undone",
         number + 1
     )
 }
 
 fn reordering_effect(stage: &Stage, standings: CountingResult) -> String {
     format!(
-        "the rows of its boards would be selected by {standings} instead of {}, at once, from all results",
+        "the rows of its boards will be selected by {standings} instead of {}, at once, from all results",
         stage.settings.standings
     )
 }

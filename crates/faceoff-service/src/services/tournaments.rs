@@ -125,7 +125,7 @@ pub async fn preview_close(app: &AppState, id: TournamentId) -> Result<Preview, 
     let record = app.store.tournament_record(id).await?;
     let (tournament, rounds) = (record.tournament, record.rounds.len());
     let effect = format!(
-        "the tournament {:?} would be closed for good, with {rounds} of {} rounds started; recordings of its games would be \
+        "the tournament {:?} will be closed for good, with {rounds} of {} rounds started. Recordings of its games will be \
          published according to its settings",
         tournament.name.as_str(),
         tournament.rules.format.last_round()

@@ -56,8 +56,9 @@ pub async fn remove_user(
 ) -> Result<(User, EndedCredentials), Problem> {
     let user = find(app, caller, id).await?;
     let effect = format!(
-        "the account of {} would be closed at once and for good, and all of its tokens and sessions revoked, and the team \
-         tokens, invitations and webhooks that this user has made would end; the name stays in the event log",
+        "the account of {0} will be closed at once and for good, and all of its tokens and sessions will be revoked. Team \
+         tokens and invitations made by {0} will be revoked, and webhooks made by {0} will be disabled. The name stays in the \
+         event log",
         user.name
     );
     Problem::check_confirmed(confirm, user.name.as_str(), &effect)?;

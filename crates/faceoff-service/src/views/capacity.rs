@@ -70,32 +70,32 @@ fn summary(day: &DayLoad) -> String {
         (false, 0) => return format!("{}: no team has a valid submission yet.", day.day),
         (true, 1) => "1 team has".to_owned(),
         (true, teams) => format!("{teams} teams have"),
-        (false, 1) => "1 team would have".to_owned(),
-        (false, teams) => format!("{teams} teams would have"),
+        (false, 1) => "1 team will have".to_owned(),
+        (false, teams) => format!("{teams} teams will have"),
     };
     let expected = match day.expected_hours {
         Some(hours) => format!("{hours:.1} hours expected, as measured in the last seven days"),
-        None => "duration unknown (nothing measured in the last seven days)".to_owned(),
+        None => "Duration unknown (nothing measured in the last seven days)".to_owned(),
     };
     let load = format!(
-        "{}: {teams} {} episodes to run: {expected}; at most {:.1} hours, if every agent uses up its time",
+        "{}: {teams} {} episodes to run. {expected}; at most {:.1} hours, if every agent uses up its time",
         day.day, day.episodes, day.worst_case_hours
     );
     let Some(available_hours) = day.hours_until_deadline else {
         return format!("{load}. No deadline.");
     };
-    let advice = "more slots, fewer episodes or a later deadline (day_deadline) would help";
+    let advice = "More slots, fewer episodes or a later deadline (day_deadline) would help";
     match day.fit {
         Fit::Surely => format!("{load}. The day has {available_hours:.1} hours: it fits."),
         Fit::Probably => format!(
             "{load}. The day has {available_hours:.1} hours: it probably fits, unless agents use up their time."
         ),
         Fit::Unknown => format!(
-            "{load}. The day has {available_hours:.1} hours: evaluations of slow agents may not finish; {advice}."
+            "{load}. The day has {available_hours:.1} hours: evaluations of slow agents may not finish. {advice}."
         ),
         Fit::Not => format!(
-            "{load}. The day has {available_hours:.1} hours: it does not fit, and evaluations that are not finished at the \
-             deadline do not count; {advice}."
+            "{load}. The day has {available_hours:.1} hours: it does not fit. Evaluations that are not finished at the deadline \
+             will not count. {advice}."
         ),
     }
 }
@@ -254,14 +254,14 @@ mod tests {
                 "probably fits",
             ),
             (Some(30.0), 400.0, Some(24.0), Fit::Not, "does not fit"),
-            (None, 400.0, Some(24.0), Fit::Unknown, "duration unknown"),
+            (None, 400.0, Some(24.0), Fit::Unknown, "Duration unknown"),
             (Some(30.0), 400.0, None, Fit::Surely, "No deadline"),
         ] {
             let load = forecast_day(expected_hours, worst_hours, available_hours);
             assert_eq!(load.fit, fit, "{}", load.summary);
             assert!(load.summary.contains(phrase), "{}", load.summary);
             assert!(
-                load.summary.contains("40 teams would have 120000 episodes"),
+                load.summary.contains("40 teams will have 120000 episodes"),
                 "{}",
                 load.summary
             );

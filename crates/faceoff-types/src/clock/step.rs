@@ -56,13 +56,13 @@ impl fmt::Display for ClockStep {
         match self.cause {
             StepCause::MonotonicClock => write!(
                 f,
-                "the system clock was set and is {size} (it shows {system_at:.0}); the server continues with {server_at:.0} \
+                "the system clock was set and is {size} (it shows {system_at:.0}). The server continues with {server_at:.0} \
                  until the clock is right or an organiser accepts it"
             ),
             StepCause::NewestChange => write!(
                 f,
                 "the system clock is wrong or was wrong before: at the start it was {size}, compared with the newest change in \
-                 the database (it shows {system_at:.0}); no evaluation day starts until it has caught up or an organiser accepts it"
+                 the database (it shows {system_at:.0}). No evaluation day starts until it has caught up or an organiser accepts it"
             ),
         }
     }

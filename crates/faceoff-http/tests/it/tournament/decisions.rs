@@ -40,7 +40,7 @@ async fn withdrawn_team_keeps_its_finished_rounds() {
     let problem = unconfirmed.problem(
         409,
         "not-confirmed",
-        &["A would be withdrawn", "the arm is sold"],
+        &["A will be withdrawn", "the arm is sold"],
     );
     assert_eq!(problem["confirm"], "A");
     assert_eq!(
@@ -176,8 +176,8 @@ async fn team_is_withdrawn_by_a_member_not_by_its_token() {
             409,
             "not-confirmed",
             &[
-                "A would be withdrawn",
-                "games of a running round would still be played",
+                "A will be withdrawn",
+                "games of a running round will still be played",
             ],
         );
     let view = cup.site.post(&path, Some(&ada), &body).await.json(200);

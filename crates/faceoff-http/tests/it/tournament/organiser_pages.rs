@@ -112,7 +112,7 @@ async fn tournament_is_run_with_forms_alone() {
         .is_some()
     {}
     let (effects, target) = decide(&mut grace, page, "void-game").await;
-    assert!(effects.contains("would be voided at once"), "{effects}");
+    assert!(effects.contains("will be voided at once"), "{effects}");
     assert_eq!(target, format!("{page}?done=game-voided"));
     let overview = dashboard_page(&grace.open("/organiser").await, 200);
     let items = texts(&overview, ".attention li");
@@ -178,7 +178,7 @@ async fn stale_page_does_not_start_the_next_round() {
                 grace.open(&decision).await,
             ] {
                 let text = texts(&again.html(409), "main").remove(0);
-                let expected = format!("round {number} has started already");
+                let expected = format!("Round {number} has started already");
                 assert!(text.contains(&expected), "{text}");
                 assert!(!again.body.contains("Start round"), "{}", again.body);
             }
@@ -196,11 +196,11 @@ async fn final_preview_names_the_teams_that_advanced() {
     let mut grace = organiser(&cup.site, "Grace").await;
     let page = cup.path.replace("/api/v1", "/organiser");
     let (effects, _) = decide(&mut grace, &page, "start-round").await;
-    assert!(effects.contains("between the 4 teams are"), "{effects}");
+    assert!(effects.contains("between the 4 teams will be"), "{effects}");
     assert_eq!(cup.play(first_by_name_wins).await, 2);
     let (effects, target) = decide(&mut grace, &page, "start-round").await;
     assert!(
-        effects.contains("between the teams that advanced from the groups are"),
+        effects.contains("between the teams that advanced from the groups will be"),
         "{effects}"
     );
     assert_eq!(target, format!("{page}?done=round-started"));
@@ -278,8 +278,7 @@ async fn teams_leave_by_a_decision_of_organisers() {
     let mut grace = organiser(&cup.site, "Grace").await;
     let page = cup.path.replace("/api/v1", "/organiser");
     let (effects, target) = decide(&mut grace, &page, "disqualify-team").await;
-    let outcome =
-        "A would be disqualified for good, with a public reason, and would rank below all others. ";
+    let outcome = "A will be disqualified for good and will rank below all others. ";
     assert!(effects.starts_with(outcome), "{effects}");
     assert!(effects.contains(". 2 of its games, and"), "{effects}");
     assert_eq!(target, format!("{page}?done=team-left"));

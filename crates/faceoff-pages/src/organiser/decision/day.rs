@@ -35,8 +35,8 @@ impl DayDecision {
                 Ok(DecisionPreview {
                     title: format!("Evaluate the missed day {}", day.date),
                     effects: format!(
-                        "The active submission of each team is evaluated for {} in the stage {}, on the episodes of that date. \
-                         A day has one cutoff: it cannot be started a second time.",
+                        "The active submission of each team will be evaluated for {} in the stage {}, on the episodes of that \
+                         date. A day has one cutoff, so you cannot start it a second time.",
                         day.date, stage.name
                     ),
                     reason_readers: Some(PUBLIC_REASON),
@@ -54,8 +54,8 @@ impl DayDecision {
                 Ok(DecisionPreview {
                     title: format!("Start the evaluation day {}", day.date),
                     effects: format!(
-                        "The active submission of each team is evaluated for {} in the stage {}. A day has one cutoff: it \
-                         cannot be started a second time, and later uploads are evaluated on the next day. {}",
+                        "The active submission of each team will be evaluated for {} in the stage {}. A day has one cutoff, so \
+                         you cannot start it a second time. Later uploads will be evaluated on the next evaluation day. {}",
                         day.date,
                         stage.name,
                         next.map_or_else(String::new, |next| next.summary)

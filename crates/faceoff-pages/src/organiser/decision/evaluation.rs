@@ -57,8 +57,8 @@ impl EvaluationDecision {
                         view.day, view.team_name
                     ),
                     effects: format!(
-                        "The evaluation stops after {} of {} episodes, without a score. It can be repeated. If it is the last \
-                         one of the day, the day is released.",
+                        "The evaluation will stop after {} of {} episodes, without a score. It can be repeated. If it is the \
+                         last one of the day, the day will be released.",
                         view.progress.episodes_done, view.progress.episodes_total
                     ),
                     reason_readers: Some(TEAM_REASON),
@@ -71,8 +71,8 @@ impl EvaluationDecision {
                 let view = evaluation(app, id).await?;
                 Ok(DecisionPreview {
                     title: format!("Repeat {}’s evaluation of {}", view.team_name, view.day),
-                    effects: "The submission that was active at the cutoff is evaluated again on the same episodes. The new \
-                              evaluation replaces this one."
+                    effects: "The submission that was active at the cutoff will be evaluated again on the same episodes. The \
+                              new evaluation will replace this one."
                         .to_owned(),
                     button: "Repeat the evaluation",
                     ..DecisionPreview::new(day_page(day_of(&view)))
@@ -81,14 +81,14 @@ impl EvaluationDecision {
             Self::Extra(day, team) => {
                 let effects = evaluations::preview_extra_evaluation(app, day, team, None).await?;
                 let name = app.store.team(team).await?.name;
-                let episodes = "Until the day is released it uses the episodes of the day; after that it uses other \
-                                episodes, and the board says so.";
+                let episodes = "Until the day is released, it will use the episodes of the day. After that, it will use other \
+                                episodes, and the board will say so.";
                 Ok(DecisionPreview {
                     title: format!("Give {name} an extra evaluation for {}", day.date),
                     effects: match &effects {
                         Some(effects) => format!("{} {episodes}", sentence(effects)),
                         None => format!(
-                            "The active submission of {name} is evaluated once more for {}. {episodes}",
+                            "The active submission of {name} will be evaluated once more for {}. {episodes}",
                             day.date
                         ),
                     },

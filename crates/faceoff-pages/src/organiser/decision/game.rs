@@ -33,7 +33,7 @@ impl GameDecision {
                 Ok(DecisionPreview {
                     title: format!("Rerun {}", games::pairing_name(&state, &game)?),
                     effects:
-                        "The game is queued again, with the same submissions and the same seed."
+                        "The game will be queued again, with the same submissions and the same seed."
                             .to_owned(),
                     button: "Rerun the game",
                     ..DecisionPreview::new(page_path(game.tournament))

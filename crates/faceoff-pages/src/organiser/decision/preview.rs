@@ -1,5 +1,6 @@
-//! The preview of a decision: what it would do, before an organiser confirms it.
+//! The preview of a decision: what it will do, before an organiser confirms it.
 
+use crate::figures;
 use faceoff_service::services::decisions::Preview;
 use faceoff_types::StageDay;
 
@@ -68,13 +69,7 @@ pub(super) fn day_page(day: StageDay) -> String {
     format!("/organiser/day?stage={}&day={}", day.stage, day.date)
 }
 
-/// The effects as a sentence, with a capital letter and a full stop.
+/// The effects as sentences.
 pub(super) fn sentence(effects: &Preview) -> String {
-    let mut chars = effects.effect.chars();
-    let first: String = chars
-        .next()
-        .into_iter()
-        .flat_map(char::to_uppercase)
-        .collect();
-    format!("{first}{}.", chars.as_str())
+    figures::sentence(&effects.effect)
 }

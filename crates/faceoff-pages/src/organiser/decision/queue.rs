@@ -21,11 +21,11 @@ impl QueueDecision {
         if self == Self::Pause {
             return Ok(DecisionPreview {
                 title: "Pause the queue".to_owned(),
-                effects: "No new jobs start; running jobs finish. Evaluation days start on time, but their jobs wait. The \
-                          board shows that the queue is paused, with your reason."
+                effects: "No new jobs will start; running jobs will finish. Evaluation days will start on time, but their jobs \
+                          will wait. The board will show that the queue is paused, with your reason."
                     .to_owned(),
                 reason_readers: Some(PUBLIC_REASON),
-                button: "Pause",
+                button: "Pause the queue",
                 ..DecisionPreview::new(QUEUE_PATH)
             });
         }
@@ -33,7 +33,7 @@ impl QueueDecision {
             || "The queue is not paused.".to_owned(),
             |ruling| {
                 format!(
-                    "The queue is paused since {} ({}).",
+                    "The queue has been paused since {} ({}).",
                     utc_minute(ruling.at),
                     ruling.reason
                 )
@@ -41,8 +41,8 @@ impl QueueDecision {
         );
         Ok(DecisionPreview {
             title: "Resume the queue".to_owned(),
-            effects: format!("{since} Queued jobs start at once."),
-            button: "Resume",
+            effects: format!("{since} Queued jobs will start at once."),
+            button: "Resume the queue",
             ..DecisionPreview::new(QUEUE_PATH)
         })
     }

@@ -31,8 +31,8 @@ impl StageDecision {
         Ok(match self {
             Self::Freeze(_) => DecisionPreview {
                 title: format!("Freeze the boards of {name}"),
-                effects: "The boards keep their current results, with a notice, until you unfreeze them. Evaluations go on; \
-                          later results are visible to organisers only."
+                effects: "The boards will keep their current results, with a notice, until you unfreeze them. Evaluations will \
+                          go on; later results will be visible to organisers only."
                     .to_owned(),
                 reason_readers: Some(PUBLIC_REASON),
                 button: "Freeze the boards",
@@ -40,13 +40,14 @@ impl StageDecision {
             },
             Self::Unfreeze(_) => DecisionPreview {
                 title: format!("Unfreeze the boards of {name}"),
-                effects: "The boards show all results to everyone again, at once.".to_owned(),
+                effects: "The boards will show all results to everyone again, at once.".to_owned(),
                 button: "Unfreeze the boards",
                 ..preview
             },
             Self::FinalDay(_) => DecisionPreview {
                 title: format!("Start the final day of {name}"),
-                effects: "The active submission of each team is evaluated once more, on new episodes. Only this day counts for the board."
+                effects: "The active submission of each team will be evaluated once more, on new episodes. Only this day will \
+                          count for the board."
                     .to_owned(),
                 button: "Start the final day",
                 ..preview

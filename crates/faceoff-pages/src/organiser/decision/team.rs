@@ -37,7 +37,8 @@ impl TeamDecision {
                 let team = app.store.team(id).await?;
                 Ok(DecisionPreview {
                     title: format!("Reinstate {}", team.name),
-                    effects: "The team can upload again and is evaluated and ranked. Cancelled evaluations can be repeated.".to_owned(),
+                    effects: "The team can upload again, and will be evaluated and ranked. Cancelled evaluations can be repeated."
+                        .to_owned(),
                     reason_readers: Some(PUBLIC_REASON),
                     button: "Reinstate the team",
                     ..DecisionPreview::new(TEAMS_PATH)
@@ -51,16 +52,23 @@ impl TeamDecision {
                     .team_name;
                 let approves = matches!(self, Self::Approve(_));
                 Ok(DecisionPreview {
-                    title: format!("{} {name}", if approves { "Approve" } else { "Refuse" }),
+                    title: format!(
+                        "{} the registration of {name}",
+                        if approves { "Approve" } else { "Refuse" }
+                    ),
                     effects: if approves {
-                        "The team is created. Its first member joins with the link of the registration within seven days."
+                        "The team will be created. Its first member can join with the link of the registration within seven days."
                             .to_owned()
                     } else {
-                        "The team is not created. The link of the registration shows your reason."
+                        "The team will not be created. The link of the registration will show your reason."
                             .to_owned()
                     },
                     reason_readers: (!approves).then_some("visible to the registered contact"),
-                    button: if approves { "Approve" } else { "Refuse" },
+                    button: if approves {
+                        "Approve the registration"
+                    } else {
+                        "Refuse the registration"
+                    },
                     is_grave: !approves,
                     ..DecisionPreview::new(TEAMS_PATH)
                 })

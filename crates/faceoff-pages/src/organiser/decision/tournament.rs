@@ -69,8 +69,8 @@ impl TournamentDecision {
                 DecisionPreview {
                     title: format!("Start round {number} of {name}"),
                     effects: format!(
-                        "The games between {} are drawn and queued. For each of these teams, the submission that is active now plays \
-                         the whole round; later uploads are for the next one.",
+                        "The games between {} will be drawn and queued. For each of these teams, the submission that is active now \
+                         will play the whole round; later uploads will play in the next one.",
                         round_teams(&record, number)
                     ),
                     button: "Start the round",
@@ -79,8 +79,8 @@ impl TournamentDecision {
             }
             Self::Pause(_) => DecisionPreview {
                 title: format!("Pause {name}"),
-                effects: "No further game starts, test and friendly games included. Running games continue. The tournament’s page \
-                          shows the reason."
+                effects: "No further games will start, test and friendly games included. Running games will continue. The \
+                          tournament’s page will show the reason."
                     .to_owned(),
                 reason_readers: Some(PUBLIC_REASON),
                 button: "Pause the tournament",
@@ -88,7 +88,7 @@ impl TournamentDecision {
             },
             Self::Resume(_) => DecisionPreview {
                 title: format!("Resume {name}"),
-                effects: "Queued games start again at once.".to_owned(),
+                effects: "Queued games will start at once.".to_owned(),
                 button: "Resume the tournament",
                 ..preview
             },

@@ -20,8 +20,9 @@ impl WorkerDecision {
         match self {
             Self::Ban(worker) => DecisionPreview {
                 title: format!("Ban the worker {worker}"),
-                effects: "The worker gets no jobs and its results are rejected. Its running jobs, and its part of open evaluations, are \
-                          repeated on other workers. Finished results stay; the page of workers lists them, so that you can void them."
+                effects: "The worker will get no jobs, and its results will be rejected. Its running jobs and its part of unfinished \
+                          evaluations will be repeated on other workers. Finished results will stay; the page of workers will list \
+                          them, so that you can void them."
                     .to_owned(),
                 reason_readers: Some("visible to organisers and the operator of the worker"),
                 button: "Ban the worker",
@@ -30,7 +31,7 @@ impl WorkerDecision {
             },
             Self::Readmit(worker) => DecisionPreview {
                 title: format!("Readmit the worker {worker}"),
-                effects: "The worker gets jobs again. Check its machine first: a faulty machine fails again."
+                effects: "The worker will get jobs again. Check its machine first: a faulty machine will fail again."
                     .to_owned(),
                 button: "Readmit the worker",
                 ..DecisionPreview::new(WORKERS_PATH)

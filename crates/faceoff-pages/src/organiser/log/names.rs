@@ -109,7 +109,7 @@ impl Names {
             (Some(("person", _)), None) => "A former user".to_owned(),
             (Some(_), None) => "A team".to_owned(),
             (None, None) => match event.actor.as_str() {
-                "organiser" => "The host’s administrator".to_owned(),
+                "organiser" => "The administrator of the host".to_owned(),
                 "visitor" => "A visitor".to_owned(),
                 other => format!("The {other}"),
             },

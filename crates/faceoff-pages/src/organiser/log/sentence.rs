@@ -373,7 +373,7 @@ mod tests {
                 "season",
                 "something_new",
                 json!({}),
-                "The host’s administrator recorded “something new” for the season",
+                "The administrator of the host recorded “something new” for the season",
             ),
         ] {
             let event = event(actor, subject, kind, &details);
