@@ -68,7 +68,7 @@ impl fmt::Display for Retention {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.last {
             Some(last) => write!(f, "the last {last} and the best of each team")?,
-            None => f.write_str("everything")?,
+            None => f.write_str("all files")?,
         }
         match (self.until, self.days_after_sign_off) {
             (Some(until), _) => write!(f, " until {until}"),
@@ -85,11 +85,11 @@ mod tests {
     #[test]
     fn retention_round_trips_and_describes_itself() {
         for (json, words) in [
-            ("{}", "everything"),
+            ("{}", "all files"),
             (r#"{"last":5}"#, "the last 5 and the best of each team"),
             (
                 r#"{"until":"2027-01-01T00:00:00Z"}"#,
-                "everything until 2027-01-01T00:00:00Z",
+                "all files until 2027-01-01T00:00:00Z",
             ),
             (
                 r#"{"last":1,"days_after_sign_off":30}"#,

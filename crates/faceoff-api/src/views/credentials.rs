@@ -36,13 +36,13 @@ impl EndedCredentialsView {
         let remaining = self.remaining_people.iter();
         let restored = self.restored_people.iter();
         tokens
-            .map(|token| format!("ended: token {} ({})", token.name, token.id))
+            .map(|token| format!("revoked: token {} ({})", token.name, token.id))
             .chain(invitations.map(|invitation| {
-                format!("ended: invitation for {} ({})", invitation.note, invitation.id)
+                format!("revoked: invitation for {} ({})", invitation.note, invitation.id)
             }))
             .chain(webhooks.map(|webhook| {
                 format!(
-                    "ended: webhook {} ({}); before you enable it again, check its address and rotate its secret",
+                    "disabled: webhook {} ({}); before you enable it again, check its address and rotate its secret",
                     webhook.name, webhook.id
                 )
             }))

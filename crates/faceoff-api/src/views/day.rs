@@ -55,7 +55,7 @@ impl fmt::Display for NextCutoff {
             }
             None => write!(
                 f,
-                "{} ({}) at the earliest, started by an organiser",
+                "{} ({}) at the earliest (started by the organisers)",
                 self.day, self.zone
             ),
         }

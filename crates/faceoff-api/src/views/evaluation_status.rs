@@ -79,7 +79,7 @@ impl EvaluationStatus {
     /// What happens next to an evaluation, in words.
     pub const fn next(&self, is_released: bool, is_voided: bool) -> &'static str {
         if is_voided {
-            return "It no longer counts as the team's evaluation of the day. An organiser can rerun it.";
+            return "It no longer counts as the team's evaluation of the day. An organiser can repeat it.";
         }
         match self {
             Self::Queued => {
@@ -111,7 +111,7 @@ impl EvaluationStatus {
             }
             Self::NotPlayed { .. } => {
                 "It does not count as the team's evaluation of the day, and the row of an earlier day stays on the board. \
-             The next cutoff evaluates the active submission. An organiser can still rerun this evaluation."
+             The next cutoff evaluates the active submission. An organiser can still repeat this evaluation."
             }
             Self::Cancelled { .. } => {
                 "It does not count as the team's evaluation of the day. An organiser can repeat it with the same \

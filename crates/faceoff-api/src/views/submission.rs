@@ -120,8 +120,8 @@ impl SubmissionStatus {
                 "Rejected, and its bundle was deleted. Fix the error in the reason and upload again."
             }
             Self::ValidationError { .. } => {
-                "The check failed by a platform fault. Upload the bundle again; this one does not count as a pending \
-             submission."
+                "The validation run failed because of a platform fault. Upload the bundle again; this one does not count as a \
+             pending submission."
             }
         }
     }

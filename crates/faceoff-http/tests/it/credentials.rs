@@ -370,7 +370,7 @@ async fn page_lists_what_ended() {
     let page = browser.submit(&path, &[("confirm", "Ada")]).await;
     for words in [
         "What this change also revoked",
-        "ended: token robot",
+        "revoked: token robot",
         "User removed",
     ] {
         assert!(

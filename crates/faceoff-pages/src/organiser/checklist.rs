@@ -44,7 +44,7 @@ pub(super) async fn open_steps(app: &App) -> Result<Option<Vec<Step>>, Problem> 
         Step {
             is_done: !app.store.teams().await?.is_empty(),
             title: "Invite a team",
-            detail: "Create an invitation link for the first member of a team, who names it and invites the others. Or open the \
+            detail: "Create an invitation link for the first member of a team, who names it and invites the others. Or open \
                      registration.",
             link: Some(("/organiser/access#invite", "Invite")),
             command: Some("faceoff admin create-team NAME"),
@@ -52,7 +52,7 @@ pub(super) async fn open_steps(app: &App) -> Result<Option<Vec<Step>>, Problem> 
         Step {
             is_done: has_submission || !days.is_empty(),
             title: "Get the first valid submission",
-            detail: "A member uploads a bundle on their dashboard or by the command; a validation run tests it.",
+            detail: "A member uploads a bundle on the dashboard or with the command; a validation run tests it.",
             link: Some(("/docs/start", "Your first agent")),
             command: Some("faceoff submit FOLDER"),
         },

@@ -28,8 +28,11 @@ pub(super) struct TournamentForm {
 
 /// Names of formats with their titles.
 const FORMATS: [(&str, &str); 3] = [
-    ("round_robin", "Round robin: everyone plays everyone"),
-    ("groups", "Groups, then a final round of their best"),
+    (
+        "round_robin",
+        "Round robin: every team plays every other team",
+    ),
+    ("groups", "Groups, then a final round of the best teams"),
     ("swiss", "Swiss: opponents of about the same rank"),
 ];
 

@@ -152,7 +152,7 @@ async fn submission_passes_from_upload_to_evaluation() {
     let next_cutoff = me.next_cutoff.expect("the season is open");
     assert_eq!(
         next_cutoff.to_string(),
-        "2026-03-01 (UTC) at the earliest, started by an organiser"
+        "2026-03-01 (UTC) at the earliest (started by the organisers)"
     );
 
     let day = site.organiser.start_day(None).await.unwrap();

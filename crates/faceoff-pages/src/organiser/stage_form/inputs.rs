@@ -123,14 +123,14 @@ pub(super) static GROUPS: [InputGroup; 4] = [
             Input {
                 name: "schedule",
                 label: "Time or cron expression",
-                hint: "06:00 or 0 6 * * 1-5; empty: an organiser starts each day",
+                hint: "06:00 or 0 6 * * 1-5; empty: the organisers start each day",
                 kind: InputKind::OptionalText,
                 text: time_or_cron,
                 read: read_schedule,
             },
             Input {
                 name: "days_off",
-                label: "Dates without evaluation",
+                label: "Dates without an evaluation day",
                 hint: "2026-12-24 2026-12-25",
                 kind: InputKind::OptionalText,
                 text: days_off,
@@ -187,7 +187,7 @@ pub(super) static GROUPS: [InputGroup; 4] = [
             Input {
                 name: "standings",
                 label: "Which result counts",
-                hint: "latest: the newest; best: the highest ranked; final: that of a final day after the stage has closed; \
+                hint: "latest: the newest; best: the highest ranked; final: only that of the final day, after the stage has closed; \
 mean_of_last:5: the mean of the last 5 days",
                 kind: InputKind::Text,
                 text: |stage| stage.settings.standings.to_string(),
