@@ -44,7 +44,7 @@ const ORGANISER_TABS: [TabGroup; 9] = [
     ),
     (("/organiser/messages", "Messages"), &[]),
     (
-        ("/organiser/workers", "Site"),
+        ("/organiser/workers", "Server"),
         &[
             ("/organiser/workers", "Workers"),
             ("/organiser/storage", "Storage"),

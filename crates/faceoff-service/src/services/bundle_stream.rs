@@ -101,7 +101,7 @@ pub(crate) async fn receive(
     if bytes == 0 {
         return Err(Problem::new(
             ProblemKind::InvalidRequest,
-            "expected a bundle, got an empty body; send the bundle itself (.tar.gz, .tar.zst, .zip, or .tar of a container \
+            "expected a bundle, got an empty body; upload the bundle file itself (.tar.gz, .tar.zst, .zip, or .tar of a container \
              image)",
         ));
     }
@@ -231,8 +231,8 @@ pub(super) fn not_an_archive(first_bytes: &[u8]) -> Problem {
     Problem::new(
         ProblemKind::UnsupportedMediaType,
         format!(
-            "expected a .tar.gz, .tar.zst or .zip bundle, or the .tar of a container image, got a body that begins with the \
-             bytes {}. Send the bundle file itself as the body, not a form",
+            "expected a .tar.gz, .tar.zst or .zip bundle, or the .tar of a container image, got a file that begins with the \
+             bytes {}. Upload the bundle file itself (over the API as the body, not as a form)",
             hex::encode(&first_bytes[..first_bytes.len().min(QUOTED_BYTES)])
         ),
     )
