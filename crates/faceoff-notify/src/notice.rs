@@ -70,7 +70,9 @@ impl Notice {
             SubjectContext::User { team } => {
                 let is_membership = matches!(
                     self.event,
-                    Event::PersonJoined { .. } | Event::PersonLeft { .. }
+                    Event::PersonJoined { .. }
+                        | Event::PersonRenamed { .. }
+                        | Event::PersonLeft { .. }
                 );
                 is_membership && team == Some(own_team)
             }

@@ -179,6 +179,10 @@ const DONE_TEXTS: &[(&str, &str)] = &[
     ("final-day", "The final day has started."),
     ("signed-off", "The stage is signed off."),
     (
+        "user-renamed",
+        "Your name was changed. Sign in with it from now on.",
+    ),
+    (
         "password-set",
         "Password changed. Your other sessions and tokens no longer work.",
     ),

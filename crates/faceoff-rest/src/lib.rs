@@ -159,6 +159,7 @@ fn user_routes() -> OpenApiRouter<App> {
         .routes(routes!(sessions::create_session))
         .routes(routes!(sessions::end_session))
         .routes(routes!(users::list_people))
+        .routes(routes!(users::change_person))
         .routes(routes!(users::remove_person))
         .routes(routes!(users::set_password))
         .routes(routes!(

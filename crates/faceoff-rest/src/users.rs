@@ -1,9 +1,9 @@
-//! Users: listing them, setting passwords, and closing accounts.
+//! Users: listing and renaming them, setting passwords, and closing accounts.
 
 use crate::paging::{Page, PageQuery, Paged};
 use axum::{Json, extract::State};
 use faceoff_api::{
-    requests::{Confirmation, NewPassword},
+    requests::{Confirmation, NewPassword, UserChange},
     views::{credentials::ChangedAccessView, user::UserView},
 };
 use faceoff_service::{
@@ -32,6 +32,27 @@ pub(crate) async fn list_people(
     let users = users::list_users(&app, &caller).await?;
     let page = page.select(users, |user| user.id)?;
     Ok(page.map(user::view))
+}
+
+/// Changes a user's name, with which the user signs in. Tokens and sessions stay valid. For organisers and the user.
+#[utoipa::path(
+    patch, path = "/people/{id}", tag = "people", security(("team" = []), ("organiser" = [])),
+    params(("id" = UserId, Path)), request_body = UserChange,
+    responses(
+        (status = 200, body = UserView),
+        (status = 403), (status = 404),
+        (status = 409, description = "another user, perhaps a former one, has the name or one that looks like it, or the account is closed"),
+        (status = 422),
+    )
+)]
+pub(crate) async fn change_person(
+    caller: Caller,
+    State(app): State<App>,
+    PathParam(id): PathParam<UserId>,
+    Body(UserChange { name }): Body<UserChange>,
+) -> Result<Json<UserView>, Problem> {
+    let renamed = users::rename_user(&app, &caller, id, name).await?;
+    Ok(Json(user::view(renamed)))
 }
 
 /// Closes a user's account at once: all tokens and sessions are revoked, and the team tokens, invitations and webhooks that the user has

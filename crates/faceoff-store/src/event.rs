@@ -67,6 +67,11 @@ pub enum Event {
         /// The team of a member; `None` for an organiser.
         team: Option<TeamId>,
     },
+    /// The user changed their name, or an organiser did.
+    PersonRenamed {
+        from: UserName,
+        to: UserName,
+    },
     /// The user's account was closed.
     PersonLeft {
         name: UserName,

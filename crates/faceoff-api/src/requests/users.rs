@@ -187,6 +187,14 @@ pub struct SignInRequest {
     pub password: String,
 }
 
+/// A user's new name.
+#[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct UserChange {
+    /// 1 to 40 letters and digits of any script, spaces and . _ - ' & + ·
+    pub name: UserName,
+}
+
 /// Sets the caller's password.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]

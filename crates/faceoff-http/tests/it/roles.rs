@@ -59,6 +59,7 @@ const ACCESS_TABLE: &[(&str, &str)] = &[
     ("DELETE /invitations/{id}", "?000+++"),
     ("GET /me", "?++++--"),
     ("GET /people", "?++++++"),
+    ("PATCH /people/{id}", "?00-+++"),
     ("PUT /people/{id}/password", "?00-+--"),
     ("POST /people/{id}/remove", "?00-+++"),
     ("GET /questions", "+++++++"),

@@ -532,7 +532,7 @@ async fn member_changes_password_and_team() {
     let team = site.team("Alpha").await;
     let mut ada = member(&site, &team, "Ada").await;
     let page = dashboard_page(&ada.open("/dashboard/settings").await, 200);
-    assert_eq!(texts(&page, "h2"), ["Password", "Team"]);
+    assert_eq!(texts(&page, "h2"), ["Your name", "Password", "Team"]);
     let set = async |ada: &mut Browser<'_>, old: &str, new: &str| {
         let fields = [("old_password", old), ("new_password", new)];
         ada.submit("/dashboard/settings/password", &fields).await
@@ -577,6 +577,44 @@ async fn member_changes_password_and_team() {
         refused.body.contains("value=\"ftp://x\""),
         "the form is kept"
     );
+}
+
+#[tokio::test]
+async fn member_changes_own_name_and_signs_in_with_it() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let mut ada = member(&site, &team, "Ada").await;
+    let _ = member(&site, &team, "Eve").await;
+    for (name, status, expected) in [
+        ("eve", 409, "Eve"),
+        ("<b>", 422, "your name"),
+        ("", 422, "your name"),
+    ] {
+        let fields = [("user_name", name)];
+        let refused = ada.submit("/dashboard/settings/name", &fields).await;
+        let html = dashboard_page(&refused, status);
+        let alert = first_text(&refused, "[role=alert]");
+        assert!(alert.contains(expected), "{alert}");
+        let field = Selector::parse("#user_name").unwrap();
+        let typed = html.select(&field).next().unwrap().attr("value");
+        assert_eq!(typed, Some(name), "the form is kept");
+    }
+    let fields = [("user_name", " Ada Lovelace ")];
+    let renamed = ada.submit("/dashboard/settings/name", &fields).await;
+    let target = redirect_target(&renamed).to_owned();
+    assert_eq!(target, "/dashboard/settings?done=user-renamed");
+    let page = dashboard_page(&ada.open(&target).await, 200);
+    assert!(texts(&page, "[role=status]")[0].contains("Sign in with it"));
+    let mut other = Browser::new(&site);
+    for (name, signed_in) in [("Ada", false), ("Ada Lovelace", true)] {
+        let fields = [("name", name), ("password", PASSWORD)];
+        let answer = other.submit("/sign-in", &fields).await;
+        assert_eq!(answer.status == 303, signed_in, "{name}");
+    }
+    let events = "/api/v1/events?kind=person_renamed";
+    let events = site.get(events, Some(ADMIN)).await.json(200);
+    let names = json!({ "from": "Ada", "to": "Ada Lovelace" });
+    assert_eq!(events[0]["details"], names);
 }
 
 #[tokio::test]

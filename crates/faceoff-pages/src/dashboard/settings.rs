@@ -1,4 +1,4 @@
-//! `/dashboard/settings` and `/organiser/settings`: the user's password; for members also how the team is called and described.
+//! `/dashboard/settings` and `/organiser/settings`: the user's name and password; for members also how the team is called and described.
 
 use crate::{
     dashboard_frame::{DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
@@ -22,6 +22,7 @@ use faceoff_service::{
     problem::{Problem, ProblemKind},
     services::{teams, users},
 };
+use faceoff_types::UserId;
 use serde::Deserialize;
 
 /// The pages below `dashboard_path`, which is `/dashboard` or `/organiser`.
@@ -29,6 +30,7 @@ pub(crate) fn router(dashboard_path: &str) -> Router<App> {
     let path = |rest: &str| format!("{dashboard_path}/settings{rest}");
     Router::new()
         .route(&path(""), get(page))
+        .route(&path("/name"), post(rename))
         .route(&path("/password"), post(set_password))
 }
 
@@ -50,10 +52,10 @@ fn settings_path(caller: &Caller) -> &'static str {
 struct Page {
     frame: Frame,
     head: DashboardHeader,
-    /// Path of the page; the form of the password posts to a path below it.
+    /// Path of the page; the forms of name and password post to paths below it.
     path: &'static str,
-    /// The user's name; `None` for a team's token.
-    user: Option<String>,
+    /// The user's name, as the form has it; `None` for a team's token.
+    user_name: Option<String>,
     min_password_chars: usize,
     /// `None` for organisers.
     team: Option<TeamForm>,
@@ -67,11 +69,17 @@ struct TeamForm {
     link: String,
 }
 
+/// What was typed into a form that was refused.
+enum Refused {
+    UserName(String),
+    Team(TeamForm),
+}
+
 async fn page_with(
     app: &App,
     caller: &Caller,
     notice: Notice<'_>,
-    form: Option<TeamForm>,
+    refused: Option<Refused>,
 ) -> Result<Response, PageProblem> {
     let path = settings_path(caller);
     let current = caller.team().map(|team| TeamForm {
@@ -79,14 +87,19 @@ async fn page_with(
         affiliation: team.profile.affiliation.clone().unwrap_or_default(),
         link: team.profile.link.clone().unwrap_or_default(),
     });
-    let page = Page {
+    let mut page = Page {
         frame: Frame::load(app, path).await?,
         head: DashboardHeader::new(caller, path, notice),
         path,
-        user: caller.user().map(|user| user.name.to_string()),
+        user_name: caller.user().map(|user| user.name.to_string()),
         min_password_chars: passwords::MIN_CHARS,
-        team: form.or(current),
+        team: current,
     };
+    match refused {
+        Some(Refused::UserName(name)) => page.user_name = Some(name),
+        Some(Refused::Team(form)) => page.team = Some(form),
+        None => {}
+    }
     render_dashboard(&page, notice)
 }
 
@@ -96,6 +109,43 @@ async fn page(
     Query(notice): Query<DoneQuery>,
 ) -> Result<Response, PageProblem> {
     page_with(&app, &caller, Notice::Done(&notice), None).await
+}
+
+/// The calling user. A token of a team or of the host has no account.
+fn calling_user(caller: &Caller) -> Result<UserId, Problem> {
+    match caller.user() {
+        Some(user) => Ok(user.id),
+        None => Err(Problem::new(
+            ProblemKind::Forbidden,
+            "this token belongs to no user; sign in with your name",
+        )),
+    }
+}
+
+#[derive(Deserialize)]
+struct UserForm {
+    user_name: String,
+}
+
+/// Changes the user's own name.
+async fn rename(
+    PageUser(caller): PageUser,
+    State(app): State<App>,
+    form: Result<PageForm<UserForm>, Problem>,
+) -> Result<Response, PageProblem> {
+    let PageForm(UserForm { user_name }) = form?;
+    let user = calling_user(&caller)?;
+    let renamed = match user_name.trim().parse() {
+        Ok(name) => users::rename_user(&app, &caller, user, name).await,
+        Err(error) => Err(Problem::invalid("your name", error)),
+    };
+    match renamed {
+        Ok(_) => Ok(redirect_done(settings_path(&caller), "user-renamed")),
+        Err(problem) => {
+            let refused = Some(Refused::UserName(user_name));
+            page_with(&app, &caller, Notice::Refused(&problem), refused).await
+        }
+    }
 }
 
 #[derive(Deserialize)]
@@ -112,15 +162,12 @@ async fn set_password(
     form: Result<PageForm<PasswordForm>, Problem>,
 ) -> Result<Response, PageProblem> {
     let PageForm(form) = form?;
-    let Some(user) = caller.user() else {
-        let detail = "a token has no password; sign in with your name";
-        return Err(Problem::new(ProblemKind::Forbidden, detail).into());
-    };
+    let user = calling_user(&caller)?;
     let request = NewPassword {
         old: Some(form.old_password),
         password: form.new_password,
     };
-    match users::set_password(&app, &caller, user.id, request, client).await {
+    match users::set_password(&app, &caller, user, request, client).await {
         Ok(_) => Ok(redirect_done(settings_path(&caller), "password-set")),
         Err(problem) => page_with(&app, &caller, Notice::Refused(&problem), None).await,
     }
@@ -152,7 +199,7 @@ async fn change_team(
         Ok(_) => Ok(redirect_done(settings_path(&member.caller), "team-changed")),
         Err(problem) => {
             let notice = Notice::Refused(&problem);
-            page_with(&app, &member.caller, notice, Some(form)).await
+            page_with(&app, &member.caller, notice, Some(Refused::Team(form))).await
         }
     }
 }

@@ -9,7 +9,7 @@ use crate::{
 };
 use faceoff_api::requests::NewPassword;
 use faceoff_store::{EndedCredentials, Principal, StoreError, User};
-use faceoff_types::UserId;
+use faceoff_types::{UserId, UserName};
 
 /// The users whom the caller may see: organisers all, a team its members.
 #[boxed]
@@ -44,6 +44,24 @@ pub async fn find(app: &AppState, caller: &Caller, id: UserId) -> Result<User, P
         }
         _ => Err(Problem::not_found("user")),
     }
+}
+
+/// Renames a user, who signs in with the new name from then on.
+///
+/// # Errors
+/// `Forbidden` or `NotFound` unless the caller is the user or an organiser; `UserNameTaken`: another user has the name.
+#[boxed]
+pub async fn rename_user(
+    app: &AppState,
+    caller: &Caller,
+    id: UserId,
+    name: UserName,
+) -> Result<User, Problem> {
+    find(app, caller, id).await?;
+    let now = app.config.clock.now();
+    let renamed = app.store.rename_user(caller.actor(), id, name, now).await?;
+    tracing::info!(user = %id, actor = %caller.actor(), "user renamed");
+    Ok(renamed)
 }
 
 /// Closes a user's account, if that is confirmed with the user's name. Returns what ended with it, too.

@@ -67,6 +67,7 @@ impl Event {
             | Self::Invited { .. }
             | Self::InvitationRevoked { .. }
             | Self::PersonJoined { .. }
+            | Self::PersonRenamed { .. }
             | Self::PersonLeft { .. }
             | Self::SignedIn
             | Self::PasswordSet

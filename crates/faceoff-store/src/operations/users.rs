@@ -15,7 +15,7 @@ use crate::{
         users::{self, User},
     },
 };
-use faceoff_types::{TeamId, TokenId, UserId};
+use faceoff_types::{TeamId, TokenId, UserId, UserName};
 use jiff::Timestamp;
 
 impl Store {
@@ -68,6 +68,34 @@ impl Store {
             ended.remaining_users.clear();
             ended.restored_users.clear();
             Ok((users::find(tx, id).await?, ended))
+        })
+        .await
+    }
+
+    /// Renames a user. Tokens and sessions stay valid; the old name no longer signs in.
+    /// [`StoreError::UserNameTaken`] if another user has the name, [`StoreError::Conflict`] if the user has left.
+    #[boxed]
+    pub async fn rename_user(
+        &self,
+        actor: Actor,
+        id: UserId,
+        name: UserName,
+        now: Timestamp,
+    ) -> Result<User> {
+        self.write(actor, now, async |tx| {
+            let user = users::find(tx, id).await?;
+            if user.left_at.is_some() {
+                return StoreError::conflict(format!("{} has left", user.name));
+            }
+            if name != user.name {
+                users::set_name(tx, id, &name).await?;
+                let event = Event::PersonRenamed {
+                    from: user.name,
+                    to: name,
+                };
+                tx.record(Subject::User(id), event);
+            }
+            users::find(tx, id).await
         })
         .await
     }

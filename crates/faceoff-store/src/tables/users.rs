@@ -126,21 +126,46 @@ pub(crate) async fn invited(
     Ok(rows.into_iter().map(User::from).collect())
 }
 
+/// Checks that no other user has the name, or one that looks like it: [`StoreError::UserNameTaken`]. Users who have left count, since the
+/// log shows their names.
+async fn check_name_is_free(
+    connection: &mut SqliteConnection,
+    id: UserId,
+    name: &UserName,
+) -> Result<()> {
+    let skeleton = name_skeleton(name.as_str());
+    let names = sqlx::query_scalar!("SELECT name FROM people WHERE id <> ?", id);
+    let names = names.fetch_all(connection).await?;
+    let taken = names
+        .into_iter()
+        .find(|name| name_skeleton(name.as_str()) == skeleton);
+    match taken {
+        Some(taken) => Err(StoreError::UserNameTaken(taken.to_string())),
+        None => Ok(()),
+    }
+}
+
+/// Renames a user. [`StoreError::UserNameTaken`] if another user has the name, or one that looks like it.
+pub(crate) async fn set_name(
+    connection: &mut SqliteConnection,
+    id: UserId,
+    name: &UserName,
+) -> Result<()> {
+    check_name_is_free(&mut *connection, id, name).await?;
+    let name = name.as_str();
+    sqlx::query!("UPDATE people SET name = ? WHERE id = ?", name, id)
+        .execute(connection)
+        .await?;
+    Ok(())
+}
+
 /// Adds a user. [`StoreError::UserNameTaken`] if a user has the name, or one that looks like it.
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,
     user: &User,
     password: Option<&str>,
 ) -> Result<()> {
-    let skeleton = name_skeleton(user.name.as_str());
-    let names = sqlx::query_scalar!("SELECT name FROM people");
-    let names = names.fetch_all(&mut *connection).await?;
-    if let Some(taken) = names
-        .into_iter()
-        .find(|name| name_skeleton(name.as_str()) == skeleton)
-    {
-        return Err(StoreError::UserNameTaken(taken.to_string()));
-    }
+    check_name_is_free(&mut *connection, user.id, &user.name).await?;
     sqlx::query!(
         "INSERT INTO people (id, name, team_id, joined_at, password, accepted_terms) VALUES (?, ?, ?, ?, ?, ?)",
         user.id,

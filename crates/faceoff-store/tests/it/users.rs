@@ -67,6 +67,55 @@ async fn returning_user_keeps_identity_and_gets_new_tokens() {
 }
 
 #[tokio::test]
+async fn renamed_user_keeps_access_and_signs_in_by_the_new_name() {
+    let f = TestStore::new().await;
+    let alpha = f.create_team("Alpha").await;
+    let ada = add_user(&f, 1, "Ada", InvitationRole::Member(alpha.id)).await;
+    let eve = add_user(&f, 2, "Eve", InvitationRole::Member(alpha.id)).await;
+    let (actor, now) = (Actor::User(ada.id), f.now);
+    let hash = *blake3::hash(&[1; 32]).as_bytes();
+    let verified = f.store.verify_token(hash, TokenKind::ApiToken, now).await;
+    let token = verified.unwrap().unwrap().token.id;
+    f.store
+        .set_password(actor.clone(), ada.id, "hash", token, now)
+        .await
+        .unwrap();
+    let rename = async |id, name: &str| {
+        let name = name.parse().unwrap();
+        f.store.rename_user(actor.clone(), id, name, now).await
+    };
+    assert_eq!(rename(ada.id, "Ada").await.unwrap().name, ada.name);
+    // The own name in another spelling is free, another user's is not.
+    assert_eq!(rename(ada.id, "ADA").await.unwrap().name.as_str(), "ADA");
+    let taken = rename(ada.id, "eVE").await.unwrap_err();
+    assert!(matches!(taken, StoreError::UserNameTaken(name) if name == "Eve"));
+    let renamed = rename(ada.id, "Ada Lovelace").await.unwrap();
+    assert_eq!(renamed.name.as_str(), "Ada Lovelace");
+    assert!(principal(&f, 1).await.is_ok());
+    assert_eq!(f.store.password_hash_of("Ada").await.unwrap(), None);
+    let signs_in = f.store.password_hash_of("ada lovelace").await.unwrap();
+    assert_eq!(signs_in.map(|(id, _)| id), Some(ada.id));
+    let events = f.store.events_after(0, 1000).await.unwrap();
+    let renames = events.iter().filter_map(|record| match &record.event {
+        Event::PersonRenamed { from, to } => Some((from.as_str(), to.as_str())),
+        _ => None,
+    });
+    let expected = [("Ada", "ADA"), ("ADA", "Ada Lovelace")];
+    assert_eq!(renames.collect::<Vec<_>>(), expected);
+
+    f.store
+        .remove_user(actor.clone(), eve.id, now)
+        .await
+        .unwrap();
+    assert_contains(&rename(eve.id, "Eva").await.unwrap_err(), &["Eve has left"]);
+    let former = rename(ada.id, "Eve").await.unwrap_err();
+    assert!(
+        matches!(former, StoreError::UserNameTaken(_)),
+        "the log shows it"
+    );
+}
+
+#[tokio::test]
 async fn removed_user_loses_all_access() {
     let f = TestStore::new().await;
     let alpha = f.create_team("Alpha").await;

@@ -5,7 +5,7 @@ use faceoff_api::{
     requests::{
         Confirmation, Decision, JoinRequest, Made, NewAnnouncement, NewAnswer, NewInvitation,
         NewPassword, NewQuestion, NewTeam, NewTerms, NewToken, Reason, RegistrationRequest,
-        RevocationQuery, SeasonChange, TeamChange,
+        RevocationQuery, SeasonChange, TeamChange, UserChange,
     },
     views::{
         announcement::{AnnouncementView, QuestionView, TermsView},
@@ -17,7 +17,7 @@ use faceoff_api::{
         user::{CallerView, UserView},
     },
 };
-use faceoff_types::{InvitationId, QuestionId, RegistrationId, TeamId, TokenId, UserId};
+use faceoff_types::{InvitationId, QuestionId, RegistrationId, TeamId, TokenId, UserId, UserName};
 use reqwest::Method;
 
 impl Client {
@@ -54,6 +54,12 @@ impl Client {
     /// The users that the caller may see.
     pub async fn users(&self) -> anyhow::Result<Vec<UserView>> {
         self.list(self.request(Method::GET, "/people")).await
+    }
+
+    pub async fn rename_user(&self, id: UserId, name: UserName) -> anyhow::Result<UserView> {
+        let path = format!("/people/{id}");
+        self.call_with_body(Method::PATCH, &path, &UserChange { name })
+            .await
     }
 
     /// Removes a user; `confirm` is their name.

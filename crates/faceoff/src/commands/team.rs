@@ -13,7 +13,7 @@ use faceoff_api::{
     requests::{InvitedRole, TeamChange},
     views::team::TeamView,
 };
-use faceoff_types::{InvitationId, TeamId, TeamName, UserId};
+use faceoff_types::{InvitationId, TeamId, TeamName, UserId, UserName};
 
 /// Shows and changes the team, invites members, and asks the organisers.
 #[derive(Debug, Args)]
@@ -47,6 +47,11 @@ enum Action {
     Storage,
     /// List the team's members
     Members,
+    /// Change the name with which you sign in
+    RenameMe {
+        /// Your new name
+        name: UserName,
+    },
     /// Create an invitation link for one member and print it; it is shown only once
     Invite {
         /// Label that identifies the invitation in lists, e.g. the name of the invited person
@@ -108,7 +113,9 @@ async fn own_person(client: &Client) -> anyhow::Result<UserId> {
     let caller = client.whoami().await?;
     match caller.person {
         Some(person) => Ok(person.id),
-        None => bail!("the token does not belong to a user; only users can leave"),
+        None => {
+            bail!("the token does not belong to a user: sign in with your name (faceoff login)")
+        }
     }
 }
 
@@ -148,6 +155,10 @@ async fn act(client: &Client, json: bool, action: Action) -> anyhow::Result<()> 
                 user_line,
                 "no members yet; invite one with faceoff team invite NOTE",
             )
+        }
+        Action::RenameMe { name } => {
+            let renamed = client.rename_user(own_person(client).await?, name).await?;
+            print(json, &renamed, user_line)
         }
         Action::Invite { note } => {
             let invitation = new_invitation(InvitedRole::Member, note);

@@ -82,6 +82,11 @@ fn about_access(words: &EventText<'_>, names: &Names) -> Option<String> {
             Some(team) => format!("joined the team {team}"),
             None => "joined as an organiser".to_owned(),
         },
+        "person_renamed" => format!(
+            "renamed the user {} to {}",
+            words.field("from"),
+            words.field("to")
+        ),
         "person_left" => format!("closed the account of {name}"),
         "signed_in" => "signed in".to_owned(),
         "password_set" => "set a new password".to_owned(),

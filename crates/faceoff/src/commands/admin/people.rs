@@ -17,7 +17,7 @@ use faceoff_api::{
     requests::{InvitedRole, NewInvitation, SeasonChange},
     views::invitation::RegistrationView,
 };
-use faceoff_types::{DivisionName, InvitationId, RegistrationId, UserId};
+use faceoff_types::{DivisionName, InvitationId, RegistrationId, UserId, UserName};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum PeopleAction {
@@ -51,6 +51,13 @@ pub(super) enum PeopleAction {
     Uninvite {
         /// The invitation's id
         invitation: InvitationId,
+    },
+    /// Change the name with which a user signs in
+    Rename {
+        /// The user's name or id
+        person: String,
+        /// The new name
+        name: UserName,
     },
     /// Remove a user: their access ends at once; without --confirm, only list the effects
     Remove {
@@ -137,6 +144,11 @@ pub(super) async fn people(
         }
         PeopleAction::Invitations => list_invitations(client, json).await,
         PeopleAction::Uninvite { invitation } => uninvite(client, json, invitation).await,
+        PeopleAction::Rename { person, name } => {
+            let id = find_user(client, &person).await?;
+            let renamed = client.rename_user(id, name).await?;
+            print(json, &renamed, user_line)
+        }
         PeopleAction::Remove { person, confirm } => {
             let id = find_user(client, &person).await?;
             let removed = client.remove_user(id, confirm).await?;
