@@ -44,7 +44,7 @@ const ORGANISER_TABS: [TabGroup; 9] = [
     ),
     (("/organiser/messages", "Messages"), &[]),
     (
-        ("/organiser/workers", "Server"),
+        ("/organiser/workers", "Site"),
         &[
             ("/organiser/workers", "Workers"),
             ("/organiser/storage", "Storage"),

@@ -26,6 +26,7 @@ use axum::{
     routing::get,
 };
 use faceoff_service::{
+    api_document::ApiDocument,
     app::App,
     extract::{PathParam, QueryParams},
     problem::{Problem, ProblemKind},
@@ -36,7 +37,6 @@ use outline::{OutlineGroup, SideList, outline};
 use reference::{Reference, Schema, TokenRequirement, TypePart};
 use search::{Index, SearchResults};
 use serde::Deserialize;
-use serde_json::Value;
 use std::sync::{Arc, OnceLock};
 use tokio::sync::Mutex;
 
@@ -60,7 +60,7 @@ const REFERENCE_HEADINGS: [(&str, &str); 2] =
 /// Content of the documentation, built on first use.
 #[derive(Debug)]
 struct Documentation {
-    api: Arc<Value>,
+    api: ApiDocument,
     reference: OnceLock<Reference>,
     outline: OnceLock<Vec<OutlineGroup>>,
     index: OnceLock<Index>,
@@ -70,7 +70,8 @@ struct Documentation {
 
 impl Documentation {
     fn reference(&self) -> &Reference {
-        self.reference.get_or_init(|| Reference::new(&self.api))
+        self.reference
+            .get_or_init(|| Reference::new(self.api.value()))
     }
 
     fn outline(&self) -> &[OutlineGroup] {
@@ -95,7 +96,7 @@ impl Documentation {
 }
 
 /// The pages of the documentation. `api` is the OpenAPI document of the API.
-pub(super) fn router(api: Arc<Value>) -> Router<App> {
+pub(super) fn router(api: ApiDocument) -> Router<App> {
     let documentation = Arc::new(Documentation {
         api,
         reference: OnceLock::new(),

@@ -68,13 +68,12 @@ use axum::{
     middleware,
     routing::{get, post},
 };
-use faceoff_service::{app::App, extract::MAX_JSON_BYTES, timeouts};
-use serde_json::Value;
+use faceoff_service::{api_document::ApiDocument, app::App, extract::MAX_JSON_BYTES, timeouts};
 use std::{sync::Arc, time::Duration};
 
 /// All pages and their assets. `time_limit` is the longest time of a request; `api` is the API's
 /// OpenAPI document, which the documentation shows.
-pub fn router(app: &App, time_limit: Duration, api: Arc<Value>) -> Router<App> {
+pub fn router(app: &App, time_limit: Duration, api: ApiDocument) -> Router<App> {
     Router::new()
         .route("/", get(board::overall))
         .route("/embed", get(board::embedded::page))

@@ -67,17 +67,17 @@ use axum::{Router, extract::DefaultBodyLimit, http::HeaderMap, middleware, routi
 use document::Document;
 use faceoff_api::paths::API_BASE;
 use faceoff_service::{
-    app::App, extract::MAX_JSON_BYTES, request_preconditions::RequestPreconditions, timeouts,
+    api_document::ApiDocument, app::App, extract::MAX_JSON_BYTES,
+    request_preconditions::RequestPreconditions, timeouts,
 };
 use faceoff_types::Competition;
-use serde_json::Value;
 use served_document::ServedDocument;
 use std::{sync::Arc, time::Duration};
 use utoipa::OpenApi;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 /// All routes, and the OpenAPI document. `timeout` limits the time of every response except uploads and archives.
-pub fn router(timeout: Duration, competition: &Competition) -> (Router<App>, Arc<Value>) {
+pub fn router(timeout: Duration, competition: &Arc<Competition>) -> (Router<App>, ApiDocument) {
     let resources = OpenApiRouter::with_openapi(Document::openapi())
         .merge(season_routes())
         .merge(stage_routes())
@@ -100,12 +100,15 @@ pub fn router(timeout: Duration, competition: &Competition) -> (Router<App>, Arc
         .layer(DefaultBodyLimit::disable());
     // Archives have no time limit, because the time to make one is not known in advance.
     let archives = OpenApiRouter::new().routes(routes!(season_archive::season_archive));
-    let (router, mut document) = OpenApiRouter::new()
+    let (router, mut derived) = OpenApiRouter::new()
         .nest(API_BASE, resources.merge(uploads).merge(archives))
         .split_for_parts();
-    document.info = Document::openapi().info;
-    deprecated_routes::describe(&mut document);
-    let document = Arc::new(document::complete(document, competition));
+    let competition = Arc::clone(competition);
+    let document = ApiDocument::new(move || {
+        derived.info = Document::openapi().info;
+        deprecated_routes::describe(&mut derived);
+        document::complete(derived, &competition)
+    });
     let served = ServedDocument::new(&document);
     let router = router.route(
         &format!("{API_BASE}/openapi.json"),

@@ -7,6 +7,7 @@ use axum::{
 };
 use faceoff_service::{
     accept::accepts_gzip,
+    api_document::ApiDocument,
     request_preconditions::{ETag, RequestPreconditions},
 };
 use flate2::{Compression, write::GzEncoder};
@@ -28,9 +29,9 @@ struct Encoded {
 
 impl ServedDocument {
     /// The document will be serialised when it is first requested.
-    pub(super) fn new(document: &Arc<Value>) -> Self {
-        let document = Arc::clone(document);
-        let encode = move || Encoded::new(&document);
+    pub(super) fn new(document: &ApiDocument) -> Self {
+        let document = document.clone();
+        let encode = move || Encoded::new(document.value());
         Self(Arc::new(LazyLock::new(Box::new(encode))))
     }
 

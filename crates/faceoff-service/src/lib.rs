@@ -8,6 +8,7 @@ pub mod accept;
 pub mod agent_resources;
 mod aggregated_rows;
 pub mod answer_cache;
+pub mod api_document;
 pub mod app;
 pub mod archive_contents;
 pub mod auth;

@@ -1,26 +1,37 @@
 //! Texts that look alike have the same *skeleton*, as defined by Unicode's technical standard 39.
 
-use std::{collections::HashMap, sync::LazyLock};
+use std::cmp::Ordering;
 use unicode_normalization::UnicodeNormalization;
 
-/// Each character with what it looks like; entries end with `\0`. Made by `build.rs`.
+/// Each character with what it looks like, sorted by character; entries end with `\0`. Made by `build.rs`.
 static TABLE: &str = include_str!(concat!(env!("OUT_DIR"), "/look_alikes.txt"));
 
-static PROTOTYPES: LazyLock<HashMap<char, &'static str>> = LazyLock::new(|| {
-    let entries = TABLE.split_terminator('\0');
-    entries
-        .filter_map(|entry| {
-            let c = entry.chars().next()?;
-            Some((c, &entry[c.len_utf8()..]))
-        })
-        .collect()
-});
+/// What a character looks like; `None` if only like itself. Searches the table by halves: a map of it takes longer to make than most
+/// programs ever search.
+fn prototype(wanted: char) -> Option<&'static str> {
+    let mut entries = TABLE;
+    while !entries.is_empty() {
+        let mut middle = entries.len() / 2;
+        while !entries.is_char_boundary(middle) {
+            middle -= 1;
+        }
+        let start = entries[..middle].rfind('\0').map_or(0, |end| end + 1);
+        let (entry, later) = entries[start..].split_once('\0')?;
+        let c = entry.chars().next()?;
+        entries = match wanted.cmp(&c) {
+            Ordering::Less => &entries[..start],
+            Ordering::Equal => return Some(&entry[c.len_utf8()..]),
+            Ordering::Greater => later,
+        };
+    }
+    None
+}
 
 /// The skeleton of `text`.
 pub(crate) fn skeleton(text: &str) -> String {
     let mut prototypes = String::with_capacity(text.len());
     for c in text.nfd() {
-        match PROTOTYPES.get(&c) {
+        match prototype(c) {
             Some(prototype) => prototypes.push_str(prototype),
             None => prototypes.push(c),
         }

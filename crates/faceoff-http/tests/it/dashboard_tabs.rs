@@ -4,7 +4,7 @@ use crate::{browser::Browser, html::texts, site::Site, team_dashboard::dashboard
 use serde_json::json;
 
 #[tokio::test]
-async fn tabs_of_people_and_server_have_a_second_row() {
+async fn tabs_of_people_and_site_have_a_second_row() {
     let site = Site::start().await;
     let role = json!({ "role": "organiser", "note": "Grace" });
     let mut grace = Browser::join(&site, "Grace", role).await;
@@ -23,13 +23,13 @@ async fn tabs_of_people_and_server_have_a_second_row() {
         ),
         (
             "/organiser/workers",
-            "Server",
+            "Site",
             vec!["Workers", "Storage"],
             "Workers",
         ),
         (
             "/organiser/storage",
-            "Server",
+            "Site",
             vec!["Workers", "Storage"],
             "Storage",
         ),

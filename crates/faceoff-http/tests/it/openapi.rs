@@ -121,6 +121,7 @@ async fn document_lists_all_operations() {
         "GET /api/v1/webhooks/{id}/deliveries",
         "GET /api/v1/whoami",
         "GET /api/v1/workers",
+        "PATCH /api/v1/people/{id}",
         "PATCH /api/v1/season",
         "PATCH /api/v1/stages/{id}",
         "PATCH /api/v1/submissions/{id}",

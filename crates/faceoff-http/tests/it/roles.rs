@@ -222,6 +222,7 @@ fn harmless_body(route: &str) -> Value {
         "POST /sessions" => json!({ "name": "", "password": "" }),
         "POST /stages" => json!({ "name": "" }),
         "POST /submissions/{id}/ablation" => json!({ "episodes_per_task": 0 }),
+        "PATCH /people/{id}" => json!({ "name": "Another Name" }),
         "PATCH /submissions/{id}" => json!({ "label": "" }),
         "POST /teams" | "POST /tokens" | "POST /tournaments" => json!({ "name": "" }),
         "POST /webhooks" => json!({ "name": "", "url": "" }),

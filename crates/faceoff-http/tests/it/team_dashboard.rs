@@ -614,7 +614,7 @@ async fn member_changes_own_name_and_signs_in_with_it() {
     let events = "/api/v1/events?kind=person_renamed";
     let events = site.get(events, Some(ADMIN)).await.json(200);
     let names = json!({ "from": "Ada", "to": "Ada Lovelace" });
-    assert_eq!(events[0]["details"], names);
+    assert_eq!(events["events"][0]["details"], names);
 }
 
 #[tokio::test]
