@@ -1,7 +1,8 @@
-//! Writes the table of characters that look alike, of Unicode's technical standard 39, in the format that `src/look_alikes.rs` reads.
+//! Writes the table of characters that look alike, of Unicode's technical standard 39, for `src/look_alikes.rs`.
 //!
 //! The crate with the standard's tables has an address for each character and each text that it resembles, and for each address the program
-//! has an entry by which it is loaded. A text is smaller (docs/contributing/building.md has figures), so the crate is used here only.
+//! has an entry by which it is loaded. Numbers and one text are smaller (docs/contributing/building.md has figures), so the crate is used here
+//! only.
 
 use std::{env, error::Error, fs, path::PathBuf};
 use unicode_normalization::UnicodeNormalization;
@@ -9,7 +10,9 @@ use unicode_security::confusable_detection::skeleton;
 
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed=build.rs");
-    let mut table = String::new();
+    let mut characters = Vec::new();
+    let mut ends = Vec::new();
+    let mut prototypes = String::new();
     for c in '\u{1}'..=char::MAX {
         let text = c.to_string();
         // Others are decomposed before they are looked up.
@@ -18,10 +21,17 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         let prototype: String = skeleton(&text).collect();
         if prototype != text {
-            table.extend([text.as_str(), &prototype, "\0"]);
+            prototypes.push_str(&prototype);
+            characters.push(c);
+            ends.push(u16::try_from(prototypes.len())?);
         }
     }
+    let number = characters.len();
+    let source = format!(
+        "static CHARACTERS: [char; {number}] = {characters:?};\nstatic ENDS: [u16; {number}] = {ends:?};\n\
+         static PROTOTYPES: &str = {prototypes:?};\n"
+    );
     let folder = PathBuf::from(env::var("OUT_DIR")?);
-    fs::write(folder.join("look_alikes.txt"), table)?;
+    fs::write(folder.join("look_alikes.rs"), source)?;
     Ok(())
 }

@@ -224,7 +224,10 @@ fn submitted_folder_is_evaluated_and_dataset_downloaded() {
         output.contains("withdrawn") && output.contains(&second),
         "{output}"
     );
-    let equal_chars = first.chars().zip(second.chars()).take_while(|(a, b)| a == b);
+    let equal_chars = first
+        .chars()
+        .zip(second.chars())
+        .take_while(|(a, b)| a == b);
     let ambiguous = &first[..equal_chars.count()];
     ada(&["activate", ambiguous]).expect_refusal(FAILED, &["give more characters"]);
     ada(&["activate", &second]).expect_success();

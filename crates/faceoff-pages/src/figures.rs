@@ -100,8 +100,12 @@ pub(super) fn expiry_state(
     Some(format!("{state} {}", utc_minute(at)))
 }
 
-/// A detail of a problem as sentences, with a capital letter and a full stop.
+/// A detail of a problem as sentences, with a capital letter and a full stop. A field's name keeps its spelling, as in “closes_at: …”.
 pub(super) fn sentence(detail: &str) -> String {
+    let first_word = detail.split(' ').next().unwrap_or_default();
+    if first_word.ends_with(':') {
+        return format!("{detail}.");
+    }
     let mut letters = detail.chars();
     let first = letters.next().into_iter().flat_map(char::to_uppercase);
     let mut text: String = first.chain(letters).collect();
@@ -261,6 +265,15 @@ mod tests {
         assert!(text(Tier::Improvable).contains(&deployable));
         assert!(text(Tier::Improvable).contains(&improvable));
         assert!(text(Tier::NonDeployable).contains(&improvable));
+    }
+
+    #[test]
+    fn sentence_keeps_the_spelling_of_field_names() {
+        assert_eq!(sentence("no team has it"), "No team has it.");
+        assert_eq!(
+            sentence("closes_at: expected a time"),
+            "closes_at: expected a time."
+        );
     }
 
     #[test]

@@ -1,30 +1,19 @@
 //! Texts that look alike have the same *skeleton*, as defined by Unicode's technical standard 39.
 
-use std::cmp::Ordering;
 use unicode_normalization::UnicodeNormalization;
 
-/// Each character with what it looks like, sorted by character; entries end with `\0`. Made by `build.rs`.
-static TABLE: &str = include_str!(concat!(env!("OUT_DIR"), "/look_alikes.txt"));
+// `CHARACTERS` in ascending order; the prototype of each, what it looks like, is the part of `PROTOTYPES` that ends at the number in `ENDS`.
+// Written by build.rs.
+include!(concat!(env!("OUT_DIR"), "/look_alikes.rs"));
 
-/// What a character looks like; `None` if only like itself. Searches the table by halves: a map of it takes longer to make than most
-/// programs ever search.
-fn prototype(wanted: char) -> Option<&'static str> {
-    let mut entries = TABLE;
-    while !entries.is_empty() {
-        let mut middle = entries.len() / 2;
-        while !entries.is_char_boundary(middle) {
-            middle -= 1;
-        }
-        let start = entries[..middle].rfind('\0').map_or(0, |end| end + 1);
-        let (entry, later) = entries[start..].split_once('\0')?;
-        let c = entry.chars().next()?;
-        entries = match wanted.cmp(&c) {
-            Ordering::Less => &entries[..start],
-            Ordering::Equal => return Some(&entry[c.len_utf8()..]),
-            Ordering::Greater => later,
-        };
-    }
-    None
+/// What a character looks like; `None` if only like itself.
+fn prototype(c: char) -> Option<&'static str> {
+    let index = CHARACTERS.binary_search(&c).ok()?;
+    let start = match index {
+        0 => 0,
+        _ => ENDS[index - 1],
+    };
+    Some(&PROTOTYPES[usize::from(start)..usize::from(ENDS[index])])
 }
 
 /// The skeleton of `text`.

@@ -85,7 +85,7 @@ async fn overfull_day_is_logged_once_and_again_at_its_cutoff() {
     let lines = warnings.capacity_warnings();
     assert_eq!(lines.len(), 3, "{lines:#?}");
     for (line, day) in lines.iter().zip(["2026-03-02", "2026-03-02", "2026-03-03"]) {
-        for part in ["stage=Qualifying", &format!("day={day}"), "more slots"] {
+        for part in ["stage=Qualifying", &format!("day={day}"), "More slots"] {
             assert!(line.contains(part), "{part:?} is not in {line}");
         }
     }

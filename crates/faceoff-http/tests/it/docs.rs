@@ -373,8 +373,8 @@ async fn search_query_is_escaped_and_limited() {
 async fn missing_documentation_page_is_not_found() {
     let site = Site::start().await;
     for (path, message) in [
-        ("/docs/nothing", "the documentation has no page nothing"),
-        ("/docs/start.md", "the documentation has no page start.md"),
+        ("/docs/nothing", "The documentation has no page nothing"),
+        ("/docs/start.md", "The documentation has no page start.md"),
         ("/docs/api-reference/unknown", "no operations named unknown"),
         ("/docs/api-reference/schemas/Nothing", "no schema Nothing"),
         ("/docs/images/nothing.svg", "no picture nothing.svg"),

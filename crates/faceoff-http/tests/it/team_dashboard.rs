@@ -587,8 +587,8 @@ async fn member_changes_own_name_and_signs_in_with_it() {
     let _ = member(&site, &team, "Eve").await;
     for (name, status, expected) in [
         ("eve", 409, "Eve"),
-        ("<b>", 422, "your name"),
-        ("", 422, "your name"),
+        ("<b>", 422, "Your name"),
+        ("", 422, "Your name"),
     ] {
         let fields = [("user_name", name)];
         let refused = ada.submit("/dashboard/settings/name", &fields).await;
