@@ -16,7 +16,7 @@ pub struct SideFault {
 /// How a side got ready for a rally: its agent is started if it is not running, and must answer `reset`. Times are in seconds and
 /// do not include the opponent's. The start-up time is present if the agent had to be started.
 #[derive(Debug, Clone, PartialEq)]
-pub enum RallyEntry {
+pub enum RallyReadiness {
     Ready {
         startup_s: Option<f64>,
         /// Interpolation of the agent's actions.
@@ -40,7 +40,7 @@ pub enum RallyEntry {
     },
 }
 
-impl RallyEntry {
+impl RallyReadiness {
     /// Total time for start-up and reset, in seconds.
     #[must_use]
     pub fn time_s(&self) -> f64 {
@@ -124,7 +124,7 @@ pub struct RallyStart<'a> {
     /// The side in whose half the puck lies at the start.
     pub serving_side: Side,
     /// How the sides got ready.
-    pub entries: &'a [RallyEntry; 2],
+    pub readiness: &'a [RallyReadiness; 2],
     /// The true initial state.
     pub state: &'a GameState,
 }

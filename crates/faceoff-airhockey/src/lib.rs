@@ -7,8 +7,8 @@
 mod columns;
 mod drawings;
 mod end_description;
-mod env;
 mod game_record;
+mod hello_env;
 mod magnitudes;
 mod running_game;
 mod running_side;
@@ -19,7 +19,7 @@ mod world;
 pub use columns::{action_space, recording_columns};
 pub use end_description::{LOST_PUCK, OWN_GOAL, SLOW_GOAL, describe_end};
 pub use game_record::{
-    Effect, GameSink, GameStepRow, RallyEnding, RallyEntry, RallyRow, RallyStart, Response,
+    Effect, GameSink, GameStepRow, RallyEnding, RallyReadiness, RallyRow, RallyStart, Response,
     SideFault, SideStep,
 };
 pub use running_game::{FinishedGame, RunningGame};

@@ -142,13 +142,18 @@ fn describe(group: &'static str) -> impl Fn(&str, &str, Magnitude, [f64; 2]) -> 
 ///
 /// # Errors
 /// Which magnitude the simulator does not have, as text.
-pub(crate) fn settings(magnitudes: &Magnitudes) -> Result<PerturbationSettings, String> {
+pub(crate) fn perturbation_settings(
+    magnitudes: &Magnitudes,
+) -> Result<PerturbationSettings, String> {
     magnitudes.to_settings().map_err(|error| error.to_string())
 }
 
-/// Checks that a robot can be drawn for the season. It takes up to a second, but not with the ruleset's magnitudes.
-pub(crate) fn check_robot(magnitudes: &Magnitudes, mismatch_seed: Seed) -> Result<(), String> {
-    let settings = settings(magnitudes)?;
+/// Checks that a plant with its accepted deviations can be drawn for the season. It takes up to a second, but not with the ruleset's magnitudes.
+pub(crate) fn check_plant_can_be_drawn(
+    magnitudes: &Magnitudes,
+    mismatch_seed: Seed,
+) -> Result<(), String> {
+    let settings = perturbation_settings(magnitudes)?;
     if settings.model_mismatch == MismatchSettings::default()
         || Plant::can_be_drawn(&settings, mismatch_seed)
     {
@@ -178,7 +183,7 @@ mod tests {
             serde_json::to_string(&defaults).unwrap(),
             "the same fields, in the same order, with the same defaults"
         );
-        assert_eq!(settings(&all).unwrap(), defaults);
+        assert_eq!(perturbation_settings(&all).unwrap(), defaults);
         assert!(checked_magnitudes(&defaults).unwrap().is_empty());
     }
 
@@ -193,7 +198,7 @@ mod tests {
             serde_json::to_string(&changed).unwrap(),
             "files of earlier versions have the same bytes"
         );
-        assert_eq!(settings(&magnitudes).unwrap(), changed);
+        assert_eq!(perturbation_settings(&magnitudes).unwrap(), changed);
     }
 
     /// All ranges, and a value beyond each end of them.

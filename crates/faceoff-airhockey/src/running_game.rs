@@ -3,7 +3,7 @@
 
 use crate::{
     game_record::{
-        Effect, GameSink, GameStepRow, RallyEnding, RallyEntry, RallyRow, RallyStart, Response,
+        Effect, GameSink, GameStepRow, RallyEnding, RallyReadiness, RallyRow, RallyStart, Response,
         SideFault, SideStep,
     },
     running_side::RunningSide,
@@ -20,7 +20,7 @@ use faceoff_types::{
 /// provides the responses, from two processes or from a recording:
 ///
 /// ```
-/// # use faceoff_airhockey::{SimulationSetup, RallyEntry, RunningGame, Response};
+/// # use faceoff_airhockey::{SimulationSetup, RallyReadiness, RunningGame, Response};
 /// # use faceoff_episode::{AnswerTiming, NullSink};
 /// # use faceoff_sim::AirHockeyProfile;
 /// # use faceoff_sim::Interpolation;
@@ -30,7 +30,7 @@ use faceoff_types::{
 /// let setup = SimulationSetup::new(AirHockeyProfile::Ideal, seed, seed.model_mismatch());
 /// let mut game = RunningGame::begin(&setup, 900, GameLimits::default(), NullSink);
 /// while game.end().is_none() {
-///     game.start_rally(Side::BOTH.map(|side| RallyEntry::Ready {
+///     game.start_rally(Side::BOTH.map(|side| RallyReadiness::Ready {
 ///         startup_s: game.needs_start(side).then_some(0.1),
 ///         interpolation: Interpolation::Linear,
 ///         reset_s: 0.001,
@@ -138,14 +138,14 @@ impl<S: GameSink> RunningGame<S> {
     ///
     /// # Errors
     /// If the recording could not be written.
-    pub fn start_rally(&mut self, entries: [RallyEntry; 2]) -> Result<(), RecordError> {
+    pub fn start_rally(&mut self, readiness: [RallyReadiness; 2]) -> Result<(), RecordError> {
         debug_assert!(self.rally.is_none() && self.end.is_none());
         let (number, game_step) = (self.rallies, self.game.steps());
         self.rallies += 1;
         self.rally = Some(CurrentRally { number, steps: 0 });
-        for ((robot, side), entry) in self.sides.iter_mut().enumerate().zip(&entries) {
-            side.start_rally(entry, number, game_step);
-            if let Some(interpolation) = entry.interpolation() {
+        for ((robot, side), side_readiness) in self.sides.iter_mut().enumerate().zip(&readiness) {
+            side.start_rally(side_readiness, number, game_step);
+            if let Some(interpolation) = side_readiness.interpolation() {
                 self.game.set_interpolation(robot, interpolation);
             }
         }
@@ -153,7 +153,7 @@ impl<S: GameSink> RunningGame<S> {
             rally: number,
             game_step,
             serving_side: Side::BOTH[self.game.referee().serving_robot],
-            entries: &entries,
+            readiness: &readiness,
             state: &self.game.state(),
         })?;
         self.end_if_over(None)
@@ -197,7 +197,7 @@ impl<S: GameSink> RunningGame<S> {
         self.sink.observe(observations);
         let played = self.game.step(commands);
         for (side, constraints) in self.sides.iter_mut().zip(&played.constraints) {
-            side.step(constraints);
+            side.record_step(constraints);
         }
         if let Some(divergence) = played.divergence {
             self.record_divergence(divergence, number, step, game_step);
@@ -246,7 +246,7 @@ impl<S: GameSink> RunningGame<S> {
         match response {
             Response::Answer { timing, .. } => {
                 let is_late = timing.computation_time_s > self.limits.in_time_s;
-                side_state.answer(timing, is_late);
+                side_state.record_answer(timing, is_late);
                 if is_late {
                     Effect::Late
                 } else {
@@ -255,7 +255,7 @@ impl<S: GameSink> RunningGame<S> {
             }
             Response::Fault { fault, timing } => {
                 side_state.add_time(timing.computation_time_s);
-                side_state.fail(fault.clone(), Phase::Step, rally, step, game_step);
+                side_state.record_fault(fault.clone(), Phase::Step, rally, step, game_step);
                 Effect::Fault
             }
             Response::Held => Effect::Held,
@@ -274,7 +274,7 @@ impl<S: GameSink> RunningGame<S> {
                 detail: divergence.cause.to_string(),
             };
             let fault = SideFault { kind, line: None };
-            side_state.fail(fault, Phase::Step, rally, step, game_step);
+            side_state.record_fault(fault, Phase::Step, rally, step, game_step);
         }
     }
 

@@ -1,7 +1,7 @@
 //! One *side* (agent and robot) of a running game. A game is divided into *windows* of equal length, which scoring treats like
 //! episodes.
 
-use crate::game_record::{RallyEntry, SideFault};
+use crate::game_record::{RallyReadiness, SideFault};
 use faceoff_episode::{AnswerTiming, TimeSum};
 use faceoff_sim::{ConstraintValues, ViolatedGroups};
 use faceoff_types::{
@@ -59,23 +59,30 @@ impl RunningSide {
     }
 
     /// Records the start of a rally, or the failure to get ready for it.
-    pub fn start_rally(&mut self, entry: &RallyEntry, rally: u32, game_step: u32) {
+    pub fn start_rally(&mut self, readiness: &RallyReadiness, rally: u32, game_step: u32) {
         self.fault = None;
         self.needs_start = false;
-        self.time_used_s += entry.time_s();
-        match entry {
-            RallyEntry::Ready { .. } => {}
-            RallyEntry::StartFailed { fault, .. } => {
-                self.fail(fault.clone(), Phase::StartUp, rally, 0, game_step);
+        self.time_used_s += readiness.time_s();
+        match readiness {
+            RallyReadiness::Ready { .. } => {}
+            RallyReadiness::StartFailed { fault, .. } => {
+                self.record_fault(fault.clone(), Phase::StartUp, rally, 0, game_step);
             }
-            RallyEntry::ResetFailed { fault, .. } => {
-                self.fail(fault.clone(), Phase::Reset, rally, 0, game_step);
+            RallyReadiness::ResetFailed { fault, .. } => {
+                self.record_fault(fault.clone(), Phase::Reset, rally, 0, game_step);
             }
         }
     }
 
     /// Records a fault. There is at most one per rally.
-    pub fn fail(&mut self, fault: SideFault, phase: Phase, rally: u32, step: u32, game_step: u32) {
+    pub fn record_fault(
+        &mut self,
+        fault: SideFault,
+        phase: Phase,
+        rally: u32,
+        step: u32,
+        game_step: u32,
+    ) {
         let fault = AgentFault {
             fault: fault.kind,
             agent_task: AgentTask::Game { side: self.side },
@@ -92,7 +99,7 @@ impl RunningSide {
         self.fault = Some(fault);
     }
 
-    pub fn answer(&mut self, timing: &AnswerTiming, is_late: bool) {
+    pub fn record_answer(&mut self, timing: &AnswerTiming, is_late: bool) {
         self.late_answers += u32::from(is_late);
         self.window_times.add(timing.computation_time_s);
         self.answer_times_s.push(timing.computation_time_s);
@@ -104,8 +111,8 @@ impl RunningSide {
         self.time_used_s += time_s;
     }
 
-    /// Adds a control step.
-    pub fn step(&mut self, constraints: &ConstraintValues) {
+    /// Records a control step in the current window.
+    pub fn record_step(&mut self, constraints: &ConstraintValues) {
         self.window.steps += 1;
         constraints.mark(&mut self.violated);
     }
@@ -168,10 +175,10 @@ mod tests {
     fn fault_between_windows_adds_no_empty_window() {
         let mut side = RunningSide::new(Side::First);
         for _ in 0..WINDOW_STEPS {
-            side.step(&ConstraintValues::default());
+            side.record_step(&ConstraintValues::default());
         }
         side.end_window();
-        let failed = RallyEntry::StartFailed {
+        let failed = RallyReadiness::StartFailed {
             startup_s: 1.0,
             fault: SideFault {
                 kind: AgentFaultKind::ClosedOutput,
@@ -181,7 +188,7 @@ mod tests {
         side.start_rally(&failed, 1, WINDOW_STEPS);
         // If the game continues, the fault is in the next window.
         let mut continued = side.clone();
-        continued.step(&ConstraintValues::default());
+        continued.record_step(&ConstraintValues::default());
         let faults = |side: RunningSide| -> Vec<(u32, u32)> {
             let windows = side.finish(0, 0).0.windows;
             windows.iter().map(|w| (w.steps, w.faults)).collect()

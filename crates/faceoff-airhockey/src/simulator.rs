@@ -3,8 +3,8 @@
 use crate::SimulationSetup;
 use crate::{
     competition,
-    env::env,
-    magnitudes::{check_robot, settings},
+    hello_env::hello_env,
+    magnitudes::{check_plant_can_be_drawn, perturbation_settings},
 };
 use faceoff_episode::{Conditions, Environment, InvalidConditions, Simulator};
 use faceoff_sim::{AirHockeyRuleset, PerturbationSettings};
@@ -51,11 +51,11 @@ impl Simulator for AirHockey {
     }
 
     fn fingerprint(&self) -> &str {
-        faceoff_sim::fingerprint()
+        faceoff_sim::simulator_fingerprint()
     }
 
-    fn env(&self, agent_task: AgentTask) -> Result<String, UnknownTask> {
-        let env = env(agent_task)?;
+    fn hello_env(&self, agent_task: AgentTask) -> Result<String, UnknownTask> {
+        let env = hello_env(agent_task)?;
         Ok(serde_json::to_string(&env).expect("writing plain data to memory cannot fail"))
     }
 
@@ -66,8 +66,12 @@ impl Simulator for AirHockey {
         Ok(Box::new(simulation_setup(conditions)?))
     }
 
-    fn check_playable(&self, magnitudes: &Magnitudes, mismatch_seed: Seed) -> Result<(), String> {
-        check_robot(magnitudes, mismatch_seed)
+    fn check_season_magnitudes(
+        &self,
+        magnitudes: &Magnitudes,
+        mismatch_seed: Seed,
+    ) -> Result<(), String> {
+        check_plant_can_be_drawn(magnitudes, mismatch_seed)
     }
 }
 
@@ -86,7 +90,7 @@ pub fn simulation_setup(conditions: &Conditions<'_>) -> Result<SimulationSetup, 
     Ok(SimulationSetup::with_ruleset(
         AirHockeyRuleset::find(ruleset).ok_or(InvalidConditions::Ruleset(ruleset))?,
         profile.try_into().map_err(InvalidConditions::Profile)?,
-        &settings(perturbations).map_err(InvalidConditions::Magnitudes)?,
+        &perturbation_settings(perturbations).map_err(InvalidConditions::Magnitudes)?,
         seed,
         mismatch_seed,
     ))

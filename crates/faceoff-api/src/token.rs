@@ -11,7 +11,7 @@ pub enum SecretKind {
     /// A team's API token.
     Team,
     /// The API token of the host, the person who runs the server.
-    Admin,
+    Host,
     /// A user's API token.
     User,
     /// The session cookie of a signed-in browser.
@@ -24,7 +24,7 @@ impl SecretKind {
     const fn prefix(self) -> &'static str {
         match self {
             Self::Team => "fo_team_",
-            Self::Admin => "fo_admin_",
+            Self::Host => "fo_admin_",
             Self::User => "fo_person_",
             Self::Session => "fo_session_",
             Self::Invitation => "fo_invite_",

@@ -134,7 +134,7 @@ impl<S: StepSink> RunningEpisode<S> {
         // Later observations are finite, since a diverging world ends the episode.
         if step == 0 && !are_finite(observation) {
             return Err(NonFiniteObservation {
-                agent_task: AgentTask::Qualifying(self.task),
+                agent_task: AgentTask::Episodes(self.task),
                 episode: self.episode,
             });
         }
@@ -191,7 +191,7 @@ impl<S: StepSink> RunningEpisode<S> {
     ) -> EpisodeOutcome {
         let fault = AgentFault {
             fault,
-            agent_task: AgentTask::Qualifying(self.task),
+            agent_task: AgentTask::Episodes(self.task),
             episode: (phase != Phase::StartUp).then_some(self.episode),
             step: (phase == Phase::Step).then(|| self.faulty_step()),
             line,
@@ -219,7 +219,7 @@ impl<S: StepSink> RunningEpisode<S> {
             Some(diverged) => fault.fault == *diverged,
             None => self.end.is_none() && !matches!(fault.fault, AgentFaultKind::Diverged { .. }),
         };
-        let is_possible = agrees && agent_task == AgentTask::Qualifying(self.task) && is_consistent;
+        let is_possible = agrees && agent_task == AgentTask::Episodes(self.task) && is_consistent;
         is_possible.then(|| self.outcome(EpisodeEnd::AGENT_FAULT, Some(fault)))
     }
 

@@ -92,7 +92,7 @@ pub trait Simulator: fmt::Debug + Send + Sync {
     ///
     /// # Errors
     /// If the simulator has no such task.
-    fn env(&self, agent_task: AgentTask) -> Result<String, UnknownTask>;
+    fn hello_env(&self, agent_task: AgentTask) -> Result<String, UnknownTask>;
     /// The environment of an evaluation. It may take milliseconds, so use one for many episodes.
     ///
     /// # Errors
@@ -106,7 +106,11 @@ pub trait Simulator: fmt::Debug + Send + Sync {
     ///
     /// # Errors
     /// Why not, beginning with the name of a group.
-    fn check_playable(&self, magnitudes: &Magnitudes, mismatch_seed: Seed) -> Result<(), String> {
+    fn check_season_magnitudes(
+        &self,
+        magnitudes: &Magnitudes,
+        mismatch_seed: Seed,
+    ) -> Result<(), String> {
         let _ = (magnitudes, mismatch_seed);
         Ok(())
     }

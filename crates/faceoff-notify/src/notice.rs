@@ -59,7 +59,7 @@ impl Notice {
     fn is_own(&self, own_team: TeamId) -> bool {
         match self.context {
             // Platform faults are visible to organisers only.
-            _ if matches!(self.event, Event::UnitGivenBack { .. }) => false,
+            _ if matches!(self.event, Event::JobReturned { .. }) => false,
             SubjectContext::Team(team)
             | SubjectContext::Submission { team, .. }
             | SubjectContext::Ablation { team, .. }
@@ -103,7 +103,7 @@ impl Notice {
             }
             // The page of a public game shows everything but platform faults.
             SubjectContext::Game { is_public, .. } => {
-                is_public && !matches!(self.event, Event::UnitGivenBack { .. })
+                is_public && !matches!(self.event, Event::JobReturned { .. })
             }
             SubjectContext::Question { .. } => {
                 matches!(self.event, Event::Answered { public: true })

@@ -30,7 +30,7 @@ impl StageVisibility {
             .frozen_boards()
             .await?
             .into_iter()
-            .map(|(stage, ruling)| (stage, ruling.at))
+            .map(|(stage, decision)| (stage, decision.at))
             .collect();
         let stages = store.stages().await?.into_iter().map(|stage| {
             let state = StageState {

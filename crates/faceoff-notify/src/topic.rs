@@ -138,12 +138,12 @@ const fn changes_queue(event: &Event) -> bool {
             | Event::MissedDayStarted { .. }
             | Event::EvaluationQueued { .. }
             | Event::EvaluationBegun
-            | Event::EvaluationFinalising
+            | Event::EvaluationScoringStarted
             | Event::EvaluationFinished { .. }
             | Event::EvaluationAgentFailed
             | Event::EvaluationPlatformFailed { .. }
             | Event::EvaluationCancelled { .. }
-            | Event::EvaluationNotPlayed { .. }
+            | Event::EvaluationDeadlineMissed { .. }
             | Event::AblationOrdered { .. }
             | Event::AblationFinished
             | Event::AblationFailed { .. }
@@ -151,7 +151,7 @@ const fn changes_queue(event: &Event) -> bool {
             | Event::ProposalPlayed
             | Event::ProposalDropped
             | Event::ShardCommitted { .. }
-            | Event::UnitGivenBack { .. }
+            | Event::JobReturned { .. }
             | Event::RoundStarted { .. }
             | Event::ReplaysOrdered { .. }
             | Event::ReplaysCancelled { .. }

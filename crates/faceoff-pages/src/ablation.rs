@@ -103,7 +103,7 @@ pub(super) async fn page(
                 .map(|(task, effects)| TaskResults::new(*task, effects, app.config.competition()))
                 .collect()
         }
-        AblationStatus::Open { .. } | AblationStatus::Failed { .. } => Vec::new(),
+        AblationStatus::Unfinished { .. } | AblationStatus::Failed { .. } => Vec::new(),
     };
     let competition = app.config.competition();
     let ablated = competition.ablation_profiles();

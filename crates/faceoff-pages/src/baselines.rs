@@ -7,7 +7,7 @@ use jiff::civil::Date;
 
 pub(super) struct Baseline {
     /// Rank that the agent would have among the teams.
-    pub(super) would_rank: u32,
+    pub(super) hypothetical_rank: u32,
     pub(super) team: String,
     pub(super) agent: Option<String>,
     pub(super) evaluation: EvaluationId,
@@ -32,7 +32,7 @@ pub(super) fn rows(board: &BoardView) -> Vec<Baseline> {
             None => row.penalty_points,
         };
         Baseline {
-            would_rank: row.would_rank,
+            hypothetical_rank: row.hypothetical_rank,
             team: row.team.to_string(),
             agent: row.agent.clone(),
             evaluation: row.evaluation,

@@ -75,7 +75,7 @@ pub(super) fn blind_notice(board: &BoardView, is_hidden: bool) -> Option<&'stati
 }
 
 pub(super) fn result_status(board: &BoardView) -> String {
-    match &board.finalised {
+    match &board.sign_off {
         None => {
             "The result is provisional: it may change until the organisers sign it off.".to_owned()
         }

@@ -44,23 +44,23 @@ pub(super) async fn episodes(
         columns.extend(suffixes.iter().map(|suffix| format!("{name}_{suffix}")));
     }
     let mut table = Table::new(&columns);
-    for line in &view.episodes {
+    for summary in &view.episodes {
         let mut row = vec![
-            line.task.to_string(),
-            line.episode.to_string(),
-            line.steps.to_string(),
-            line.success.to_string(),
-            line.end.as_str().to_owned(),
-            escape_formula(&line.why),
+            summary.task.to_string(),
+            summary.episode.to_string(),
+            summary.steps.to_string(),
+            summary.success.to_string(),
+            summary.end.as_str().to_owned(),
+            escape_formula(&summary.end_description),
         ];
         if has_positions {
-            row.extend(positions::states(line));
+            row.extend(positions::states(summary));
         }
-        row.push(or_empty(line.longest_s));
-        row.push(or_empty(line.longest_s.map(|_| line.late)));
+        row.push(or_empty(summary.longest_s));
+        row.push(or_empty(summary.longest_s.map(|_| summary.late_answers)));
         for name in &kinds {
-            let violation = line
-                .broken
+            let violation = summary
+                .violations
                 .iter()
                 .find(|violation| violation.group == *name);
             row.extend([

@@ -47,15 +47,15 @@ pub(super) fn describe_violation(
 }
 
 /// Why an episode ended, as a plain sentence without numbers. The recorded description has the numbers.
-pub(super) fn plain_end(line: &EpisodeLine, contacts: &[Contact]) -> String {
-    let task = line.task.to_string();
-    let end = line.end.to_string();
-    if line.end == EpisodeEnd::AGENT_FAULT {
+pub(super) fn plain_end(summary: &EpisodeLine, contacts: &[Contact]) -> String {
+    let task = summary.task.to_string();
+    let end = summary.end.to_string();
+    if summary.end == EpisodeEnd::AGENT_FAULT {
         return "A fault of the agent ended the episode.".to_owned();
     }
-    let text = match (task.as_str(), end.as_str(), line.success) {
+    let text = match (task.as_str(), end.as_str(), summary.success) {
         ("hit", _, true) => "Goal: the puck went into the opponent’s goal.",
-        ("hit", "left_table", false) if line.why.starts_with(SLOW_GOAL) => {
+        ("hit", "left_table", false) if summary.end_description.starts_with(SLOW_GOAL) => {
             "No goal: the puck went in, but too slowly."
         }
         ("hit", "crossed_middle", false) => return came_back(contacts),
@@ -74,10 +74,10 @@ pub(super) fn plain_end(line: &EpisodeLine, contacts: &[Contact]) -> String {
         ("prepare", "horizon", false) => {
             "The puck was not in a good hitting position when the time was up."
         }
-        (_, "left_table", false) if line.why.starts_with(OWN_GOAL) => {
+        (_, "left_table", false) if summary.end_description.starts_with(OWN_GOAL) => {
             "Own goal: the puck went into the agent’s goal."
         }
-        (_, "left_table", false) if line.why.starts_with(LOST_PUCK) => {
+        (_, "left_table", false) if summary.end_description.starts_with(LOST_PUCK) => {
             "Lost: the puck was too fast for the simulation."
         }
         (_, "left_table", false) => "Lost: the puck left the table.",
@@ -125,10 +125,10 @@ mod tests {
     }
     /// The plain reason of an episode that did not succeed.
     fn failure(task: &str, end: &str, contacts: &[Contact]) -> String {
-        let line = serde_json::json!({
+        let summary = serde_json::json!({
             "task": task, "episode": 0, "steps": 90, "success": false, "end": end, "why": "puck at x = 0.31 m",
         });
-        plain_end(&serde_json::from_value(line).unwrap(), contacts)
+        plain_end(&serde_json::from_value(summary).unwrap(), contacts)
     }
 
     #[test]

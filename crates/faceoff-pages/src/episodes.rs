@@ -109,12 +109,12 @@ pub(super) async fn page(
     let task_episodes: Vec<_> = view
         .episodes
         .iter()
-        .filter(|line| chosen.task.is_none_or(|task| task == line.task))
+        .filter(|summary| chosen.task.is_none_or(|task| task == summary.task))
         .collect();
     let matching: Vec<_> = task_episodes
         .iter()
         .copied()
-        .filter(|line| chosen.matches(line))
+        .filter(|summary| chosen.matches(summary))
         .collect();
     let pages = matching.len().div_ceil(ROWS_PER_PAGE).max(1);
     let page = usize::try_from(query.page.unwrap_or(1)).unwrap_or(usize::MAX);
@@ -125,7 +125,7 @@ pub(super) async fn page(
         .iter()
         .skip(first)
         .take(ROWS_PER_PAGE)
-        .map(|line| Row::new(competition, id, line, &still_version))
+        .map(|summary| Row::new(competition, id, summary, &still_version))
         .collect();
     let other_page = |number: usize| {
         let query = EpisodesQuery {
@@ -140,7 +140,7 @@ pub(super) async fn page(
         label: label.to_owned(),
         is_selected: selected == value,
     };
-    let is_played = |task: &Task| view.episodes.iter().any(|line| line.task == *task);
+    let is_played = |task: &Task| view.episodes.iter().any(|summary| summary.task == *task);
     let tasks = competition.task_names().filter(is_played);
     let any = ("any".to_owned(), "any limit".to_owned());
     let kinds = competition
@@ -160,7 +160,7 @@ pub(super) async fn page(
         day: clips.evaluation.stage_day.date,
         total: view.episodes.len(),
         matching: matching.len(),
-        failed: matching.iter().filter(|line| !line.success).count(),
+        failed: matching.iter().filter(|summary| !summary.success).count(),
         can_see_observations: clips.can_see_observations,
         has_filter: query
             != EpisodesQuery {

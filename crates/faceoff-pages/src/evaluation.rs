@@ -12,9 +12,9 @@ use askama::Template;
 use axum::{extract::State, response::Response};
 use faceoff_api::views::{
     clips::TimeBinView,
+    decision::DecisionView,
     evaluation::{EvaluationStatus, EvaluationView, Progress, ResultView},
     queue::QueueView,
-    ruling::RulingView,
     task::TaskView,
 };
 use faceoff_scoring::{EpisodeSummary, TIER_CHANGE_RESAMPLES};
@@ -213,7 +213,7 @@ struct Page {
     id: EvaluationId,
     team: String,
     agent: Option<String>,
-    voided: Option<RulingView>,
+    voided: Option<DecisionView>,
     extra_evaluation: Option<String>,
     is_rerun_after_release: bool,
     day: civil::Date,
@@ -226,7 +226,7 @@ struct Page {
     /// Text in place of a result.
     state: String,
     is_dataset_public: bool,
-    dataset_removed: Option<RulingView>,
+    dataset_removed: Option<DecisionView>,
     progress: Option<Progress>,
     queue: Option<QueueView>,
     /// What happens next, as a sentence.
@@ -338,9 +338,7 @@ const fn state_text(view: &EvaluationView) -> &'static str {
         }
         EvaluationStatus::Queued => "Waiting for a free slot.",
         EvaluationStatus::Running => "Running.",
-        EvaluationStatus::Finalising => {
-            "All episodes have been played; the score is being computed."
-        }
+        EvaluationStatus::Scoring => "All episodes have been played; the score is being computed.",
         EvaluationStatus::Finished { .. } => "",
         EvaluationStatus::AgentFailed { .. } => {
             "The agent was stopped because it violated the protocol or a limit too often. There is no score. The team sees \
@@ -350,7 +348,7 @@ const fn state_text(view: &EvaluationView) -> &'static str {
             "Stopped by a fault of this server, not of the agent. The evaluation is repeated with the same agent on the \
              same episodes, unless the fault persists."
         }
-        EvaluationStatus::NotPlayed { .. } => {
+        EvaluationStatus::DeadlineMissed { .. } => {
             "Not finished before the deadline of the day, because the server ran out of time, not because of the agent."
         }
         EvaluationStatus::Cancelled { .. } => "Cancelled by the organisers.",

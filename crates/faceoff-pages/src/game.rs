@@ -250,7 +250,7 @@ fn purpose_text(purpose: &PurposeView) -> String {
         }
         PurposeView::Test { .. } => "Test game; it does not count".to_owned(),
         PurposeView::Friendly { .. } => "Friendly game; it does not count".to_owned(),
-        PurposeView::Replay { replay, round, .. } => {
+        PurposeView::ScheduleReplay { replay, round, .. } => {
             format!("Repetition {replay} of the schedule, game of round {round}; it does not count")
         }
     }

@@ -125,7 +125,7 @@ async fn page_with(
         .code_status(hash_token(secret_in(code)), now)
         .await;
     let offer = match found? {
-        CodeStatus::Open(invitation, team) => match invitation.role {
+        CodeStatus::Invitation(invitation, team) => match invitation.role {
             InvitationRole::Organiser => Offer::Organiser,
             InvitationRole::Member(_) => {
                 Offer::Member(team.map(|name| name.to_string()).unwrap_or_default())
@@ -133,10 +133,10 @@ async fn page_with(
             InvitationRole::Founder => Offer::Founder,
             InvitationRole::PasswordReset(_) => Offer::PasswordReset,
         },
-        CodeStatus::Pending(registration) => {
+        CodeStatus::PendingRegistration(registration) => {
             Offer::PendingRegistration(registration.team_name.to_string())
         }
-        CodeStatus::Refused(registration) => {
+        CodeStatus::RefusedRegistration(registration) => {
             let reason = match registration.state {
                 RegistrationState::Refused { reason, .. } => reason,
                 RegistrationState::Pending | RegistrationState::Approved { .. } => String::new(),

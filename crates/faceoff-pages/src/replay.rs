@@ -95,7 +95,7 @@ pub(super) async fn embedded(
         frame: Frame::new(String::new(), ""),
         view: EpisodeReplay {
             replay: ReplaySection {
-                observed: None,
+                observed_url: None,
                 is_embedded: true,
                 ..view.replay
             },
@@ -112,7 +112,7 @@ impl EpisodeReplay {
         let visibility = Visibility::load(app, viewer).await?;
         let clips = Clips::find(app, &visibility, id).await?;
         let clip = clips.episode(task, episode).await?;
-        let line = &clip.line;
+        let summary = &clip.summary;
         let competition = app.config.competition();
         let team = app.store.team(clips.evaluation.team).await?;
         let day = clips.evaluation.stage_day.date;
@@ -127,14 +127,14 @@ impl EpisodeReplay {
                 .task(task)
                 .map(|info| info.aim.clone())
                 .unwrap_or_default(),
-            success: line.success,
-            violations: line
-                .broken
+            success: summary.success,
+            violations: summary
+                .violations
                 .iter()
                 .map(|violation| describe_violation(competition, violation))
                 .collect(),
-            late_answers: line.late,
-            duration_s: format!("{:.2}", competition.duration_s(task, line.steps)),
+            late_answers: summary.late_answers,
+            duration_s: format!("{:.2}", competition.duration_s(task, summary.steps)),
             replay: ReplaySection::new(
                 &clip,
                 &api,
@@ -155,8 +155,8 @@ impl FailedEpisodes {
         let EpisodePath { id, task, episode } = path;
         let lines = clips.episodes().await?.episodes.into_iter();
         let failed: Vec<u32> = lines
-            .filter(|line| line.task == task && !line.success && line.has_clips())
-            .map(|line| line.episode)
+            .filter(|summary| summary.task == task && !summary.success && summary.has_clips())
+            .map(|summary| summary.episode)
             .collect();
         let [previous, next] = neighbours(failed.iter().copied(), episode)
             .map(|other| other.map(|other| page_path(id, task, other)));

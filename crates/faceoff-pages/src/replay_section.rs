@@ -27,9 +27,9 @@ pub(super) struct ReplaySection {
     pub(super) steps: u32,
     pub(super) still: Still,
     /// Address of the clip of the motion.
-    pub(super) motion: String,
+    pub(super) motion_url: String,
     /// Address of the clip of observations and commands, if the viewer may see it.
-    pub(super) observed: Option<String>,
+    pub(super) observed_url: Option<String>,
     /// Is the replay embedded in another site?
     pub(super) is_embedded: bool,
     /// Replays of a page in the same group are synchronised.
@@ -43,12 +43,12 @@ impl ReplaySection {
             id: "replay",
             name,
             title,
-            outcome: plain_end(&episode.line, &episode.motion.header.contacts),
-            end_reason: episode.line.why.clone(),
-            steps: episode.line.steps,
+            outcome: plain_end(&episode.summary, &episode.motion.header.contacts),
+            end_reason: episode.summary.end_description.clone(),
+            steps: episode.summary.steps,
             still: Still::new(&episode.motion, episode.observations.as_ref()),
-            motion: format!("{api}/motion"),
-            observed: episode
+            motion_url: format!("{api}/motion"),
+            observed_url: episode
                 .observations
                 .as_ref()
                 .map(|_| format!("{api}/observed")),
@@ -65,8 +65,8 @@ pub(super) struct Still {
     pub(super) mallet_path: String,
     pub(super) opponent_path: String,
     /// Observed positions of the puck.
-    pub(super) observed: String,
-    pub(super) contacts: String,
+    pub(super) observed_puck_dots: String,
+    pub(super) contact_squares: String,
     pub(super) start: Dot,
     pub(super) puck: Dot,
     pub(super) mallet: Dot,
@@ -106,10 +106,10 @@ impl Still {
             puck_path: table_drawing::path(&puck),
             mallet_path: table_drawing::path(&mallet),
             opponent_path: table_drawing::path(&motion.mallet_positions(1)),
-            observed: observed.map_or_else(String::new, |clip| {
+            observed_puck_dots: observed.map_or_else(String::new, |clip| {
                 table_drawing::dots(&clip.observed_puck_positions())
             }),
-            contacts: table_drawing::squares(&contacts),
+            contact_squares: table_drawing::squares(&contacts),
             puck_radius: millimetres(PUCK.radius_m),
             mallet_radius: millimetres(TOOL.cylinder_radius_m),
         }

@@ -37,7 +37,7 @@ impl Side {
         api: &str,
         name: String,
     ) -> Self {
-        let outcome = &episode.line;
+        let outcome = &episode.summary;
         let label = format!("{}, episode {}, {name}", outcome.task, outcome.episode);
         let title = format!("{name}, {} {}", outcome.task, outcome.episode);
         Self {
@@ -46,7 +46,7 @@ impl Side {
             success: outcome.success,
             duration_s: format!("{:.2}", competition.duration_s(outcome.task, outcome.steps)),
             violations: outcome
-                .broken
+                .violations
                 .iter()
                 .map(|violation| describe_violation(competition, violation))
                 .collect(),

@@ -37,7 +37,7 @@ impl From<&SubmissionView> for SubmissionRow {
             SubmissionStatus::Validating => ("validating", "waiting", None),
             SubmissionStatus::Valid { .. } => ("valid", "good", None),
             SubmissionStatus::Invalid { reason, .. } => ("invalid", "bad", Some(reason.clone())),
-            SubmissionStatus::ValidationError { reason } => (
+            SubmissionStatus::PlatformFailed { reason } => (
                 "not validated (platform fault)",
                 "bad",
                 Some(reason.clone()),

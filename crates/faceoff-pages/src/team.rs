@@ -13,7 +13,7 @@ use axum::{extract::State, response::Response};
 use days::{DayResult, LatestResult, TaskViolations};
 use faceoff_api::{
     requests::{HistoryQuery, TeamPageQuery},
-    views::{evaluation::EvaluationView, ruling::RulingView, team::TeamView},
+    views::{decision::DecisionView, evaluation::EvaluationView, team::TeamView},
 };
 use faceoff_service::{
     app::App,
@@ -37,7 +37,7 @@ struct Page {
     other_stages: Vec<(String, String)>,
     /// Are the scores hidden from the viewer?
     is_hidden: bool,
-    frozen: Option<RulingView>,
+    frozen: Option<DecisionView>,
     /// Tournaments of the team.
     tournaments: Vec<(TournamentId, StageName)>,
     /// Does the competition have tiers?

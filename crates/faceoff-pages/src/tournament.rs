@@ -24,7 +24,7 @@ use faceoff_service::{
     problem::{Problem, ProblemKind},
     viewer::Viewer,
     views::{
-        game, ratings::ratings, replays::champion_shares, tournament,
+        game, ratings::ratings, schedule_replays::champion_shares, tournament,
         tournament_state::TournamentState,
     },
 };

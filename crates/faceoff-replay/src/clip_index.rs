@@ -1,4 +1,4 @@
-//! The index of the episodes in a pack of clips (a clip is the recording of an episode for replays): a line for each episode
+//! The index of the episodes in a pack of clips (a clip is the recording of an episode for replays): a summary of each episode
 //! with its start, its end and its violations.
 
 use crate::error::ReplayError;
@@ -17,7 +17,7 @@ const AGENT_FAULT_TEXT: &str = "a fault of the agent ended the episode";
 /// Maximum uncompressed size of an index.
 const MAX_BYTES: u64 = 256 << 20;
 
-/// A summary line for each episode, in the order of tasks and episodes, and histograms of computation times.
+/// A summary of each episode, in the order of tasks and episodes, and histograms of computation times.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ClipIndex {
     format: String,
@@ -51,7 +51,8 @@ pub struct EpisodeLine {
     /// How the episode ended.
     pub end: EpisodeEnd,
     /// Description of the end.
-    pub why: String,
+    #[serde(rename = "why")]
+    pub end_description: String,
     /// True position and velocity of the puck at the start: x, y (m), vx, vy (m/s), table frame. Absent in other worlds than air
     /// hockey, whose episodes have no clips.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -62,14 +63,14 @@ pub struct EpisodeLine {
     #[cfg_attr(feature = "openapi", schema(nullable = false))]
     pub last: Option<[f64; 4]>,
     /// Violations, one entry per kind.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub broken: Vec<ViolationSummary>,
+    #[serde(default, rename = "broken", skip_serializing_if = "Vec::is_empty")]
+    pub violations: Vec<ViolationSummary>,
     /// Longest computation time, s; only visible to those with access to the dataset.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub longest_s: Option<f64>,
     /// Number of answers that took longer than a control step; only visible to those with access to the dataset.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub late: u32,
+    #[serde(default, rename = "late", skip_serializing_if = "is_zero")]
+    pub late_answers: u32,
 }
 
 impl EpisodeLine {
@@ -82,10 +83,10 @@ impl EpisodeLine {
     /// Removes what only those with access to the dataset may see: details of faults, and computation times.
     pub fn make_public(&mut self) {
         if self.end == EpisodeEnd::AGENT_FAULT {
-            self.why = AGENT_FAULT_TEXT.to_owned();
+            self.end_description = AGENT_FAULT_TEXT.to_owned();
         }
         self.longest_s = None;
-        self.late = 0;
+        self.late_answers = 0;
     }
 }
 
@@ -177,19 +178,19 @@ impl TimeBins {
 }
 
 impl ClipIndex {
-    /// The line of an episode; `None` if the index has no such episode.
+    /// The summary of an episode; `None` if the index has no such episode.
     #[must_use]
-    pub fn line(&self, task: Task, episode: u32) -> Option<&EpisodeLine> {
-        let mut lines = &self.episodes[..];
-        // The lines of a task follow each other.
-        while let Some(first) = lines.first() {
+    pub fn summary(&self, task: Task, episode: u32) -> Option<&EpisodeLine> {
+        let mut summaries = &self.episodes[..];
+        // The summaries of a task follow each other.
+        while let Some(first) = summaries.first() {
             let (of_task, others) =
-                lines.split_at(lines.partition_point(|line| line.task == first.task));
+                summaries.split_at(summaries.partition_point(|summary| summary.task == first.task));
             if first.task == task {
-                let found = of_task.binary_search_by_key(&episode, |line| line.episode);
+                let found = of_task.binary_search_by_key(&episode, |summary| summary.episode);
                 return found.ok().map(|index| &of_task[index]);
             }
-            lines = others;
+            summaries = others;
         }
         None
     }
@@ -197,24 +198,25 @@ impl ClipIndex {
     /// The episodes in both indices that ended differently.
     #[must_use]
     pub fn differing_ends(&self, other: &Self) -> HashSet<(Task, u32)> {
-        let differing = self.episodes.iter().filter_map(|line| {
-            let other_line = other.line(line.task, line.episode)?;
-            let is_same = (line.success, line.end) == (other_line.success, other_line.end);
-            (!is_same).then_some((line.task, line.episode))
+        let differing = self.episodes.iter().filter_map(|summary| {
+            let other_summary = other.summary(summary.task, summary.episode)?;
+            let is_same =
+                (summary.success, summary.end) == (other_summary.success, other_summary.end);
+            (!is_same).then_some((summary.task, summary.episode))
         });
         differing.collect()
     }
 
-    /// Adds the lines of another shard (a range of episodes of one task). A task that is new follows the others.
+    /// Adds the summaries of another shard (a range of episodes of one task). A task that is new follows the others.
     pub(crate) fn merge(&mut self, other: Self) {
         self.episodes.extend(other.episodes);
         let mut order = TaskMap::new();
-        for line in &self.episodes {
+        for summary in &self.episodes {
             let next = order.len();
-            order.entry(line.task).or_insert(next);
+            order.entry(summary.task).or_insert(next);
         }
         self.episodes
-            .sort_by_key(|line| (order.get(&line.task).copied(), line.episode));
+            .sort_by_key(|summary| (order.get(&summary.task).copied(), summary.episode));
         for (task, times) in &other.times {
             self.times.entry(*task).or_default().merge(times);
         }

@@ -1,4 +1,4 @@
-//! Records an episode as two clips for replays (the public motion; the agent's observations and commands) and as a line of
+//! Records an episode as two clips for replays (the public motion; the agent's observations and commands) and as a summary in
 //! the index of episodes.
 
 use crate::{
@@ -38,7 +38,7 @@ pub(crate) struct Recording {
 pub(crate) struct EpisodeClips {
     pub motion: Clip,
     pub observed: Clip,
-    pub line: EpisodeLine,
+    pub summary: EpisodeLine,
 }
 
 impl Recording {
@@ -121,7 +121,7 @@ impl Recording {
         });
     }
 
-    /// The clips and the line of the index. Adds the computation times to `times`.
+    /// The clips and the summary for the index. Adds the computation times to `times`.
     pub fn end(mut self, outcome: &EpisodeOutcome, times: &mut TimeBins) -> EpisodeClips {
         let fault = outcome.fault.as_ref().map(|fault| &fault.fault);
         let reason = describe_end(outcome.task, outcome.end, &self.last, outcome.steps, fault);
@@ -134,23 +134,23 @@ impl Recording {
         let end = |reason| EpisodeEndSummary {
             end: outcome.end,
             success: outcome.success,
-            why: reason,
+            description: reason,
             steps: outcome.steps,
         };
         self.times_s.iter().for_each(|time_s| times.add(*time_s));
         let (observed_columns, late, lost) = self.agent_view.take();
-        let line = EpisodeLine {
+        let summary = EpisodeLine {
             task: outcome.task,
             episode: outcome.episode,
             steps: outcome.steps,
             success: outcome.success,
             end: outcome.end,
-            why: reason.clone(),
+            end_description: reason.clone(),
             start: Some(position_and_velocity(&self.start)),
             last: Some(position_and_velocity(&self.last)),
-            broken: self.violations,
+            violations: self.violations,
             longest_s: Some(self.times_s.iter().copied().fold(0.0, f64::max)),
-            late: u32::try_from(late.len()).unwrap_or(u32::MAX),
+            late_answers: u32::try_from(late.len()).unwrap_or(u32::MAX),
         };
         let (motion_columns, contacts) = self.motion.take();
         let samples = motion_columns
@@ -185,7 +185,7 @@ impl Recording {
                 header,
                 columns: motion_columns,
             },
-            line,
+            summary,
         }
     }
 }

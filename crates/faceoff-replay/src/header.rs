@@ -186,7 +186,8 @@ pub struct EpisodeEndSummary {
     pub end: EpisodeEnd,
     pub success: bool,
     /// Description of the end, for readers.
-    pub why: String,
+    #[serde(rename = "why")]
+    pub description: String,
     /// Control steps played.
     pub steps: u32,
 }

@@ -3,7 +3,7 @@
 //! A [`Clip`] holds the samples of an episode, or of 500 control steps of a game, as columns of small integers. It also has
 //! contacts between samples, violations and the end. The public motion is one clip; observations, commands and times are
 //! another. A [`Pack`] is a file of clips with an index, written while a shard or a game is played. Its [`ClipIndex`] has a
-//! line for each episode: how it started and ended, and its violations. `docs/replay.md` describes the format.
+//! summary of each episode: how it started and ended, and its violations. `docs/replay.md` describes the format.
 
 mod agent_view;
 mod analysis;

@@ -353,7 +353,7 @@ pub fn select_episodes<W: Write>(
     let mut index = merged_index(packs)?;
     index
         .episodes
-        .retain(|line| selected.contains(&(line.task, line.episode)));
+        .retain(|summary| selected.contains(&(summary.task, summary.episode)));
     index.times.clear();
     writer.add_index(&index)?;
     writer.finish()

@@ -1,10 +1,10 @@
-//! The line of an episode in a world other than air hockey, of which there are no clips.
+//! The summary of an episode in a world other than air hockey, of which there are no clips.
 
 use crate::clip_index::{EpisodeLine, TimeBins, ViolationSummary};
 use faceoff_episode::StepRow;
 use faceoff_types::{Competition, EpisodeOutcome, escape_unprintable};
 
-/// An episode of which only the line is recorded.
+/// An episode of which only the summary is recorded.
 #[derive(Debug, Default)]
 pub(crate) struct PlainRecording {
     violations: Vec<ViolationSummary>,
@@ -36,7 +36,7 @@ impl PlainRecording {
         self.times_s.push(row.timing.computation_time_s);
     }
 
-    /// The line of the index. Adds the computation times to `times`.
+    /// The summary for the index. Adds the computation times to `times`.
     pub fn end(
         self,
         outcome: &EpisodeOutcome,
@@ -45,10 +45,10 @@ impl PlainRecording {
     ) -> EpisodeLine {
         let step_s = competition.duration_s(outcome.task, 1);
         let late = self.times_s.iter().filter(|time_s| **time_s > step_s);
-        let late = u32::try_from(late.count()).unwrap_or(u32::MAX);
+        let late_answers = u32::try_from(late.count()).unwrap_or(u32::MAX);
         self.times_s.iter().for_each(|time_s| times.add(*time_s));
         let end = competition.ends.iter().find(|info| info.end == outcome.end);
-        let why = match (&outcome.fault, end) {
+        let description = match (&outcome.fault, end) {
             (Some(fault), _) => format!("the agent's fault ended the episode: {}", fault.fault),
             (None, Some(info)) => info.title.clone(),
             (None, None) => outcome.end.to_string(),
@@ -59,12 +59,12 @@ impl PlainRecording {
             steps: outcome.steps,
             success: outcome.success,
             end: outcome.end,
-            why: escape_unprintable(&why).into_owned(),
+            end_description: escape_unprintable(&description).into_owned(),
             start: None,
             last: None,
-            broken: self.violations,
+            violations: self.violations,
             longest_s: Some(self.times_s.iter().copied().fold(0.0, f64::max)),
-            late,
+            late_answers,
         }
     }
 }

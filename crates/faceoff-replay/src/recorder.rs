@@ -12,7 +12,7 @@ use faceoff_episode::{EpisodeStart, RecordError, StepRow, StepSink};
 use faceoff_types::{Competition, EpisodeOutcome, Task};
 use std::{io::Write, sync::Arc};
 
-/// Writes a pack of the episodes of one task. It holds the samples of one episode and a line for each episode in memory.
+/// Writes a pack of the episodes of one task. It holds the samples of one episode and a summary of each episode in memory.
 pub struct ClipRecorder<W> {
     task: Task,
     competition: Arc<Competition>,
@@ -27,7 +27,7 @@ pub struct ClipRecorder<W> {
 enum Current {
     /// With clips.
     AirHockey(Box<Recording>),
-    /// In another world: a line without clips.
+    /// In another world: a summary without clips.
     Plain(PlainRecording),
 }
 
@@ -73,8 +73,8 @@ impl<W: Write> ClipRecorder<W> {
         let recording = match recording {
             Current::AirHockey(recording) => *recording,
             Current::Plain(recording) => {
-                let line = recording.end(outcome, &self.competition, times);
-                self.index.episodes.push(line);
+                let summary = recording.end(outcome, &self.competition, times);
+                self.index.episodes.push(summary);
                 return Ok(());
             }
         };
@@ -85,7 +85,7 @@ impl<W: Write> ClipRecorder<W> {
             .add(ClipKey::motion(self.task, episode), &motion)?;
         self.pack
             .add(ClipKey::observed(self.task, episode), &observed)?;
-        self.index.episodes.push(clips.line);
+        self.index.episodes.push(clips.summary);
         Ok(())
     }
 }

@@ -164,7 +164,7 @@ pub(crate) fn board_table(competition: &Competition, board: &BoardView) -> Table
             String::new(),
             String::new(),
             "true".to_owned(),
-            row.would_rank.to_string(),
+            row.hypothetical_rank.to_string(),
         ];
         table.row(rank.into_iter().chain(common_fields!(competition, row, "")));
     }
@@ -199,7 +199,7 @@ pub(crate) fn history_table(competition: &Competition, history: &HistoryView) ->
             escape_formula(row.division.as_ref().map_or("", |name| name.as_str())),
             row.baseline.to_string(),
             or_empty(row.rank),
-            or_empty(row.would_rank),
+            or_empty(row.hypothetical_rank),
         ];
         let result_fields = [
             row.score.to_string(),

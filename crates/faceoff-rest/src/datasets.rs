@@ -225,7 +225,7 @@ async fn find_released(
                 blake3: dataset_blake3.clone(),
             });
         }
-        EvaluationState::Queued | EvaluationState::Running { .. } | EvaluationState::Finalising => {
+        EvaluationState::Queued | EvaluationState::Running { .. } | EvaluationState::Scoring => {
             "the evaluation has not finished; poll it until its state is “finished”"
         }
         EvaluationState::AgentFailed { .. } => {
@@ -235,7 +235,7 @@ async fn find_released(
         EvaluationState::PlatformFailed { .. } => {
             "the evaluation failed by a platform fault and has no dataset; GET /api/v1/evaluations lists its rerun"
         }
-        EvaluationState::NotPlayed { .. } => {
+        EvaluationState::DeadlineMissed { .. } => {
             "the evaluation did not finish before the deadline and has no dataset"
         }
         EvaluationState::Cancelled { .. } => "the evaluation was cancelled and has no dataset",

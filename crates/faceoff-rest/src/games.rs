@@ -70,7 +70,7 @@ pub(crate) async fn cancel_game(
     let requested_by = match game.purpose {
         GamePurpose::Test { asked_by } => asked_by,
         GamePurpose::Friendly { asked_by } => Some(asked_by),
-        GamePurpose::Round(_) | GamePurpose::Replay { .. } => {
+        GamePurpose::Round(_) | GamePurpose::ScheduleReplay { .. } => {
             return Err(Problem::new(
                 ProblemKind::Conflict,
                 "a game of the schedule cannot be cancelled; an organiser can pause the tournament, withdraw a team, or cancel \

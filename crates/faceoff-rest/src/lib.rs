@@ -35,15 +35,15 @@ mod links;
 mod live_game;
 mod live_reader;
 mod me;
+mod organiser_decisions;
 mod paging;
 mod partial_uploads;
 mod proposals;
 mod ratings;
 mod registrations;
-mod replays;
 mod rounds;
-mod rulings;
 mod runtimes;
+mod schedule_replays;
 mod season;
 mod season_archive;
 mod served_document;
@@ -205,13 +205,13 @@ fn stage_routes() -> OpenApiRouter<App> {
         .routes(routes!(proposals::propose))
         .routes(routes!(proposals::apply_proposal))
         .routes(routes!(proposals::drop_proposal))
-        .routes(routes!(rulings::void_evaluation))
-        .routes(routes!(rulings::void_day))
-        .routes(routes!(rulings::disqualify_team))
-        .routes(routes!(rulings::pause_queue))
-        .routes(routes!(rulings::resume_queue))
+        .routes(routes!(organiser_decisions::void_evaluation))
+        .routes(routes!(organiser_decisions::void_day))
+        .routes(routes!(organiser_decisions::disqualify_team))
+        .routes(routes!(organiser_decisions::pause_queue))
+        .routes(routes!(organiser_decisions::resume_queue))
         .routes(routes!(clock::accept_clock))
-        .routes(routes!(rulings::reinstate_team))
+        .routes(routes!(organiser_decisions::reinstate_team))
 }
 
 /// Routes of submissions, ablations, storage and workers.
@@ -276,8 +276,11 @@ fn tournament_routes() -> OpenApiRouter<App> {
         .routes(routes!(friendly_games::order_test_games))
         .routes(routes!(friendly_games::order_friendly_game))
         .routes(routes!(friendly_games::list_uncounted_games))
-        .routes(routes!(replays::order_replays, replays::cancel_replays))
-        .routes(routes!(replays::certainty))
+        .routes(routes!(
+            schedule_replays::order_replays,
+            schedule_replays::cancel_replays
+        ))
+        .routes(routes!(schedule_replays::certainty))
         .routes(routes!(ratings::ratings))
         .routes(routes!(ratings::head_to_head))
 }

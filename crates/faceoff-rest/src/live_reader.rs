@@ -57,7 +57,7 @@ pub(crate) struct LiveReader {
 /// State of a game in the database.
 enum StoredState {
     /// Pending or running, with the number of the running attempt; `None` if pending.
-    Open(Option<u32>),
+    Unfinished(Option<u32>),
     Over(LiveEndState),
 }
 
@@ -206,11 +206,11 @@ impl LiveReader {
                 events.push(self.over_event(state)?);
             }
             // The attempt has ended, and its result is being stored.
-            StoredState::Open(Some(running)) if running == attempt && has_ended => {
+            StoredState::Unfinished(Some(running)) if running == attempt && has_ended => {
                 self.push_game_events(&update, &mut events)?;
                 events.push(self.over_event(LiveEndState::Played)?);
             }
-            StoredState::Open(_) => {
+            StoredState::Unfinished(_) => {
                 // The attempt ended without a result. It is skipped if the client has not seen its beginning.
                 if self.sent_attempt == Some(attempt) {
                     self.push_game_events(&update, &mut events)?;
@@ -268,8 +268,8 @@ impl LiveReader {
             game => game?,
         };
         Ok(match game.state {
-            GameState::Queued => StoredState::Open(None),
-            GameState::Running { attempt, .. } => StoredState::Open(Some(attempt)),
+            GameState::Queued => StoredState::Unfinished(None),
+            GameState::Running { attempt, .. } => StoredState::Unfinished(Some(attempt)),
             GameState::Played(_) => StoredState::Over(LiveEndState::Played),
             GameState::PlatformFailed { .. } => StoredState::Over(LiveEndState::Broken),
             GameState::Void { .. } => StoredState::Over(LiveEndState::Void),

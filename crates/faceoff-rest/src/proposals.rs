@@ -255,14 +255,14 @@ pub(super) async fn dataset(
                 blake3: dataset_blake3,
             }));
         }
-        EvaluationState::Queued | EvaluationState::Running { .. } | EvaluationState::Finalising => {
+        EvaluationState::Queued | EvaluationState::Running { .. } | EvaluationState::Scoring => {
             "has not finished; poll it there until its state is “finished”"
         }
         EvaluationState::AgentFailed { .. } => {
             "has no dataset, because the agent had too many faults, which are listed there"
         }
         EvaluationState::PlatformFailed { .. }
-        | EvaluationState::NotPlayed { .. }
+        | EvaluationState::DeadlineMissed { .. }
         | EvaluationState::Cancelled { .. } => {
             "has no dataset, because it did not finish; the reason is given there"
         }

@@ -56,6 +56,6 @@ pub(crate) async fn finalise_stage(
     OptionalJson(Confirmation { confirm }): OptionalJson<Confirmation>,
 ) -> Result<Json<StageView>, Problem> {
     let actor = organiser.actor();
-    let signed_off = stage_results::finalise_stage(&app, actor, id, confirm.as_deref()).await?;
+    let signed_off = stage_results::sign_off_stage(&app, actor, id, confirm.as_deref()).await?;
     stage::build(&app, signed_off).await.map(Json)
 }

@@ -40,7 +40,7 @@ pub(crate) async fn team_storage(
     let scope = if caller.is_organiser() {
         StorageScope::All
     } else {
-        StorageScope::Released
+        StorageScope::VisibleToTeam
     };
     storage::find(&app, id, scope).await.map(Json)
 }

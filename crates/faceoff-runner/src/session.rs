@@ -262,7 +262,7 @@ fn hello(
     stated: Option<i64>,
     env: &AgentEnvironment,
 ) -> Result<(ActionLayout, f64), SessionError> {
-    let constants = env.simulator.env(agent_task)?;
+    let constants = env.simulator.hello_env(agent_task)?;
     if constants.contains(['\n', '\r']) {
         let problem = "env has several lines".to_owned();
         return Err(PlatformFault::Simulator(problem).into());

@@ -1,7 +1,7 @@
 //! The probability that an agent would get another tier on other episodes of the same kind, estimated by a bootstrap:
 //! many samples of the evaluation's own episodes, drawn with replacement.
 
-use crate::{draws::Draws, tier::tier_with_bounds};
+use crate::{random_numbers::RandomNumbers, tier::tier_with_bounds};
 use faceoff_types::{TaskMap, Tier, TierBounds};
 
 /// Resamples of the bootstrap: the standard error of a probability of one half is 1.1 percentage points, and smaller near
@@ -44,12 +44,12 @@ impl TierChange {
         let worst = |tiers: &mut dyn Iterator<Item = Tier>| tiers.max().unwrap_or(Tier::Deployable);
         let observed = worst(&mut tasks.values().map(|task| task.tier));
 
-        let mut draws = Draws::new(key.finalize_xof());
+        let mut random_numbers = RandomNumbers::new(key.finalize_xof());
         let mut changed: TaskMap<u32> = tasks.keys().map(|task| (*task, 0)).collect();
         let mut changed_overall = 0;
         for _ in 0..TIER_CHANGE_RESAMPLES {
             let tiers = tasks.iter().map(|(task, task_points)| {
-                let tier = task_points.resampled_tier(&mut draws);
+                let tier = task_points.resampled_tier(&mut random_numbers);
                 if tier != task_points.tier
                     && let Some(count) = changed.get_mut(task)
                 {
@@ -101,13 +101,13 @@ impl TaskPoints {
         }
     }
 
-    fn resampled_tier(&self, draws: &mut Draws) -> Tier {
+    fn resampled_tier(&self, random_numbers: &mut RandomNumbers) -> Tier {
         if self.halves.first() == self.halves.last() {
             // All episodes have the same points, so all resamples have this tier.
             return self.tier;
         }
         let sum = (0..self.episodes)
-            .map(|_| u64::from(self.halves[draws.below(self.episodes)]))
+            .map(|_| u64::from(self.halves[random_numbers.below(self.episodes)]))
             .sum();
         tier_of_halves(&self.bounds, sum, self.episodes)
     }

@@ -48,7 +48,7 @@ impl Caller {
     /// The caller as the event log writes it.
     pub const fn actor(&self) -> Actor {
         match &self.principal {
-            Principal::Host => Actor::Organiser,
+            Principal::Host => Actor::Host,
             Principal::Team(team) => Actor::Team(team.id),
             Principal::Organiser(user) | Principal::Member(user, _) => Actor::User(user.id),
         }

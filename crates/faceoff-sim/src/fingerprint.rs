@@ -10,7 +10,7 @@ use std::sync::OnceLock;
 const STEPS: u32 = 60;
 
 /// The hash, as 64 hexadecimal digits.
-pub fn fingerprint() -> &'static str {
+pub fn simulator_fingerprint() -> &'static str {
     static FINGERPRINT: OnceLock<String> = OnceLock::new();
     FINGERPRINT.get_or_init(compute)
 }

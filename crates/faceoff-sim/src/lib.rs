@@ -48,7 +48,7 @@ pub use episode::{
     env_info::{EnvInfo, env_info, env_info_for},
 };
 pub use episode_step::{step_episodes, step_episodes_on};
-pub use fingerprint::fingerprint;
+pub use fingerprint::simulator_fingerprint;
 pub use game::{Game, GameSetup, GameState, GameStep, referee::RallyEnd};
 pub use interpolation::{Interpolation, JOINTS, MAX_ACTION_LEN, SUBSTEPS, UnknownInterpolation};
 pub use perturbation::{

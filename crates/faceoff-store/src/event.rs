@@ -19,8 +19,8 @@ use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
-/// The kind of a change, with its data. The names of variants and fields are stored: new ones may be added, old ones
-/// must stay.
+/// The kind of a change, with its data. The serialised names of variants and fields are stored: new ones may be
+/// added, old ones must stay, so a variant that is renamed in the code keeps its old name for `serde`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Event {
@@ -206,7 +206,8 @@ pub enum Event {
     /// The evaluation's first shard was claimed.
     EvaluationBegun,
     /// The evaluation's last shard was committed; scoring is queued.
-    EvaluationFinalising,
+    #[serde(rename = "evaluation_finalising")]
+    EvaluationScoringStarted,
     /// The evaluation has a score and a dataset.
     EvaluationFinished {
         score: f64,
@@ -224,7 +225,8 @@ pub enum Event {
         reason: String,
     },
     /// The day's deadline passed before the evaluation was complete.
-    EvaluationNotPlayed {
+    #[serde(rename = "evaluation_not_played")]
+    EvaluationDeadlineMissed {
         /// Shown to the team.
         reason: String,
     },
@@ -295,9 +297,11 @@ pub enum Event {
         agent_faults: u32,
     },
     /// A job failed by a platform fault; it is retried, or was given up.
-    UnitGivenBack {
+    #[serde(rename = "unit_given_back")]
+    JobReturned {
         /// Id of the job, as in the server's log.
-        unit: Uuid,
+        #[serde(rename = "unit")]
+        job: Uuid,
         /// Reported failures of this job so far.
         failures: u32,
         reason: String,

@@ -5,7 +5,7 @@ use crate::{
     error::Result,
     queue::{self, QueueGauges},
     store::Store,
-    tables::rulings::Ruling,
+    tables::decision_records::DecisionRecord,
 };
 use jiff::{SignedDuration, Timestamp};
 use std::sync::atomic::Ordering;
@@ -49,7 +49,7 @@ pub enum QueueHealth {
         /// Jobs that a worker could claim otherwise.
         waiting: u32,
         /// Time and reason of the pause.
-        ruling: Ruling,
+        decision: DecisionRecord,
     },
     /// Jobs can be claimed, and no worker polls for them.
     Stuck {
@@ -107,11 +107,11 @@ impl Store {
         if self.free_space.is_short() {
             return Ok(QueueHealth::DiskFull { waiting });
         }
-        if let Some(ruling) = self.season().await?.paused {
+        if let Some(decision) = self.season().await?.queue_pause {
             return Ok(QueueHealth::Paused {
                 running,
                 waiting,
-                ruling,
+                decision,
             });
         }
         // The absolute value, since the clock may have been set back after the poll.

@@ -88,9 +88,7 @@ pub async fn change_rules(
         rules: Some(rules),
         ..StageChange::default()
     };
-    store
-        .change_stage(Actor::Organiser, stage, change, now)
-        .await
+    store.change_stage(Actor::Host, stage, change, now).await
 }
 
 /// Changes the settings of a stage.
@@ -109,9 +107,7 @@ pub async fn change_settings(
         settings: Some(settings),
         ..StageChange::default()
     };
-    store
-        .change_stage(Actor::Organiser, stage, change, now)
-        .await
+    store.change_stage(Actor::Host, stage, change, now).await
 }
 
 /// Lets a stage accept only agents of these runtimes; `None` accepts all.

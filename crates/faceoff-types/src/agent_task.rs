@@ -4,13 +4,13 @@ use crate::Task;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// The task of an agent: a qualifying task, or one side of a game. Its JSON is `{"task":"hit"}` or
+/// The task of an agent: episodes of a task, or one side of a game. Its JSON is `{"task":"hit"}` or
 /// `{"task":"tournament","side":2}`, for use with `#[serde(flatten)]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(try_from = "AgentTaskFields", into = "AgentTaskFields")]
 pub enum AgentTask {
-    /// Episodes of a qualifying task.
-    Qualifying(Task),
+    /// Episodes of a task of the competition, which one agent plays alone.
+    Episodes(Task),
     /// A game against another agent.
     Game {
         /// The side that the agent plays.
@@ -26,7 +26,7 @@ impl AgentTask {
     #[must_use]
     pub const fn name(self) -> Task {
         match self {
-            Self::Qualifying(task) => task,
+            Self::Episodes(task) => task,
             Self::Game { .. } => Self::GAME,
         }
     }
@@ -35,7 +35,7 @@ impl AgentTask {
     #[must_use]
     pub const fn agent_id(self) -> u32 {
         match self {
-            Self::Qualifying(_) => 1,
+            Self::Episodes(_) => 1,
             Self::Game { side } => side.number(),
         }
     }
@@ -43,14 +43,14 @@ impl AgentTask {
 
 impl From<Task> for AgentTask {
     fn from(task: Task) -> Self {
-        Self::Qualifying(task)
+        Self::Episodes(task)
     }
 }
 
 impl fmt::Display for AgentTask {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Qualifying(task) => task.fmt(f),
+            Self::Episodes(task) => task.fmt(f),
             Self::Game { side } => write!(f, "tournament, side {}", side.number()),
         }
     }
@@ -125,7 +125,7 @@ struct AgentTaskFields {
 impl From<AgentTask> for AgentTaskFields {
     fn from(agent_task: AgentTask) -> Self {
         let side = match agent_task {
-            AgentTask::Qualifying(_) => None,
+            AgentTask::Episodes(_) => None,
             AgentTask::Game { side } => Some(side),
         };
         Self {
@@ -139,7 +139,7 @@ impl TryFrom<AgentTaskFields> for AgentTask {
     type Error = &'static str;
     fn try_from(AgentTaskFields { task, side }: AgentTaskFields) -> Result<Self, Self::Error> {
         match (task == Self::GAME, side) {
-            (false, None) => Ok(Self::Qualifying(task)),
+            (false, None) => Ok(Self::Episodes(task)),
             (true, Some(side)) => Ok(Self::Game { side }),
             (true, None) => Err("a tournament needs a side, 1 or 2"),
             (false, Some(_)) => Err("only a tournament has sides"),

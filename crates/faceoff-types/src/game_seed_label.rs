@@ -18,7 +18,7 @@ pub enum GameSeedLabel {
         meeting: u32,
     },
     /// The same meeting in a replay.
-    Replay {
+    ScheduleReplay {
         /// The number of the tournament in its season, from 1.
         tournament: u32,
         /// Number of the replay, from 1.
@@ -41,7 +41,7 @@ impl GameSeedLabel {
                 round,
                 meeting,
             } => season_secret.tournament(tournament).meeting(round, meeting),
-            Self::Replay {
+            Self::ScheduleReplay {
                 tournament,
                 replay,
                 round,
@@ -77,7 +77,7 @@ impl fmt::Display for GameSeedLabel {
                 round,
                 meeting,
             } => write!(f, "tournament/{tournament}/round/{round}/meeting/{meeting}"),
-            Self::Replay {
+            Self::ScheduleReplay {
                 tournament,
                 replay,
                 round,
@@ -120,7 +120,7 @@ impl FromStr for GameSeedLabel {
                 round,
                 "meeting",
                 meeting,
-            ] => Self::Replay {
+            ] => Self::ScheduleReplay {
                 tournament: parse_number(tournament)?,
                 replay: parse_number(replay)?,
                 round: parse_round(round)?,
@@ -145,7 +145,7 @@ mod tests {
             round,
             meeting,
         };
-        let replay = |replay| GameSeedLabel::Replay {
+        let replay = |replay| GameSeedLabel::ScheduleReplay {
             tournament: 1,
             replay,
             round: first,

@@ -35,7 +35,7 @@ async fn join_ablation(store: &Store, id: AblationId, ideal: Profile) -> anyhow:
     let artifacts = store.artifacts();
     match ablation {
         Some(Ablation {
-            state: AblationState::Open { .. },
+            state: AblationState::Unfinished { .. },
             ..
         }) => return Ok(()),
         // A worker that had lost its lease may add a late part: joined clips are not changed.

@@ -105,9 +105,9 @@ pub async fn start_due(
 
 async fn end_overdue(store: &Store, now: Timestamp) -> anyhow::Result<()> {
     let ended = store.end_overdue_days(now).await;
-    for (day, not_played) in ended.context("ending the days whose deadline has come")? {
+    for (day, unfinished) in ended.context("ending the days whose deadline has come")? {
         tracing::warn!(
-            stage = %day.stage, day = %day.date, not_played,
+            stage = %day.stage, day = %day.date, unfinished,
             "the day's deadline passed with evaluations not played"
         );
     }

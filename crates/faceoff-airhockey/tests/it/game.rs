@@ -1,7 +1,7 @@
 //! Games from scripted answers: late answers, faults, forfeits and divergence.
 
 use faceoff_airhockey::{
-    Effect, FinishedGame, GameSink, GameStepRow, RallyEnding, RallyEntry, RallyRow, RallyStart,
+    Effect, FinishedGame, GameSink, GameStepRow, RallyEnding, RallyReadiness, RallyRow, RallyStart,
     Response, RunningGame, SideFault, SimulationSetup,
 };
 use faceoff_episode::{AnswerTiming, RecordError};
@@ -97,8 +97,8 @@ enum ScriptedStep {
     Diverge,
 }
 
-fn ready(running: &RunningGame<SinkLog>, side: Side) -> RallyEntry {
-    RallyEntry::Ready {
+fn ready(running: &RunningGame<SinkLog>, side: Side) -> RallyReadiness {
+    RallyReadiness::Ready {
         startup_s: running.needs_start(side).then_some(0.5),
         interpolation: Interpolation::Trajectory,
         reset_s: 0.25,
@@ -306,7 +306,7 @@ fn failed_start_is_a_fault() {
         ..GameLimits::default()
     };
     let mut running = RunningGame::begin(&simulation_setup(), 100, limits, SinkLog::default());
-    let start_failed = RallyEntry::StartFailed {
+    let start_failed = RallyReadiness::StartFailed {
         startup_s: 120.0,
         fault: side_fault(),
     };

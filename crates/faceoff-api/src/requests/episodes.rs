@@ -89,12 +89,12 @@ impl EpisodeFilter {
     /// Whether the episode matches all conditions.
     pub fn matches(self, episode: &EpisodeLine) -> bool {
         let violates = |limit| match limit {
-            ViolatedLimit::Any => !episode.broken.is_empty(),
+            ViolatedLimit::Any => !episode.violations.is_empty(),
             ViolatedLimit::One(name) => episode
-                .broken
+                .violations
                 .iter()
                 .any(|violation| violation.group == name),
-            ViolatedLimit::Late => episode.late > 0,
+            ViolatedLimit::Late => episode.late_answers > 0,
         };
         self.task.is_none_or(|task| task == episode.task)
             && self

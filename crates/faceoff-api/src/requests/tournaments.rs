@@ -77,7 +77,8 @@ pub struct NewDeparture {
     /// The team's name.
     pub team: TeamName,
     /// Whether the team withdraws or is disqualified.
-    pub r#as: DepartureKind,
+    #[serde(rename = "as")]
+    pub kind: DepartureKind,
     /// For a disqualified team: the first round whose games against it do not count. Default: the running round, or the
     /// next one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -111,7 +112,8 @@ pub struct NewFriendlyGame {
 /// Replays of a tournament's schedule with other seeds. They do not count; they show how certain the champion is.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct NewReplays {
+#[schema(as = NewReplays)]
+pub struct NewScheduleReplays {
     /// Number of further replays.
     #[schema(minimum = 1, maximum = 1000)]
     pub times: u32,

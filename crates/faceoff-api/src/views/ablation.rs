@@ -27,7 +27,8 @@ pub struct AblationView {
 #[serde(tag = "state", rename_all = "snake_case")]
 pub enum AblationStatus {
     /// Waiting behind evaluations that count, or running.
-    Open {
+    #[serde(rename = "open")]
+    Unfinished {
         /// Episodes done and in total, over all profiles and tasks.
         progress: Progress,
     },

@@ -13,7 +13,8 @@ use utoipa::ToSchema;
 #[serde(remote = "Self")]
 pub struct BaselineRow {
     /// The rank that it would have among the teams, without the other baselines.
-    pub would_rank: u32,
+    #[serde(rename = "would_rank")]
+    pub hypothetical_rank: u32,
     /// Always true.
     pub baseline: bool,
     /// The overall tier; on a task's board the task's tier; absent in a competition without tiers.

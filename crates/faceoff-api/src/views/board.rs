@@ -3,7 +3,7 @@
 //! the boards, they do not show new results.
 
 use crate::views::{
-    baseline::BaselineRow, ruling::RulingView, sign_off::SignOffView, task::TaskView,
+    baseline::BaselineRow, decision::DecisionView, sign_off::SignOffView, task::TaskView,
     team::TeamView,
 };
 use faceoff_types::{
@@ -52,7 +52,8 @@ pub struct BoardView {
     /// The result is not signed off and may still change.
     pub provisional: bool,
     /// When and by whom the result was signed off; null before.
-    pub finalised: Option<SignOffView>,
+    #[serde(rename = "finalised")]
+    pub sign_off: Option<SignOffView>,
     /// The task; null for the overall board.
     pub task: Option<Task>,
     /// Only teams of this division are ranked, among themselves; absent if all teams are.
@@ -67,7 +68,7 @@ pub struct BoardView {
     pub tier_change_resamples: u32,
     /// If the boards are frozen: since when, and why; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub frozen: Option<RulingView>,
+    pub frozen: Option<DecisionView>,
     /// Teams that are left out because they are disqualified.
     pub disqualified: Vec<TeamView>,
     /// Tiers in the order deployable, improvable, non-deployable; within a tier by higher score, then by fewer penalty

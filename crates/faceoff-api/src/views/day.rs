@@ -17,7 +17,8 @@ pub struct DayView {
     /// The evaluation day, a date in the stage's time zone.
     pub day: Date,
     /// The day's evaluations: one for each team that had an active submission at the cutoff.
-    pub created: Vec<EvaluationView>,
+    #[serde(rename = "created")]
+    pub evaluations: Vec<EvaluationView>,
     /// Teams without a valid submission at the cutoff. What they upload later is evaluated on another day.
     pub without_submission: Vec<TeamView>,
     /// Teams whose active submission the stage excludes, and why; absent if there are none.

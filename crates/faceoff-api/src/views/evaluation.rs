@@ -2,7 +2,7 @@
 //! results are *released* (made public) once all its evaluations have ended.
 
 pub use crate::views::evaluation_status::{EvaluationStatus, FaultView, ResultView};
-use crate::views::{queue::QueueView, ruling::RulingView};
+use crate::views::{decision::DecisionView, queue::QueueView};
 use faceoff_types::{
     EvaluationId, Profile, StageId, SubmissionId, Task, TeamId, TeamName, deprecated_names,
 };
@@ -45,7 +45,7 @@ pub struct EvaluationView {
     pub rerun_after_release: bool,
     /// If it was voided and does not count: when, and why; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub voided: Option<RulingView>,
+    pub voided: Option<DecisionView>,
     /// True if the result is hidden until the organisers reveal the blind stage; absent otherwise.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub blind: bool,
@@ -53,7 +53,7 @@ pub struct EvaluationView {
     pub public: bool,
     /// If its dataset was removed: when, and by which retention rule; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub dataset_removed: Option<RulingView>,
+    pub dataset_removed: Option<DecisionView>,
     /// Perturbation profile of the simulator.
     pub profile: Profile,
     /// Tasks in the order in which they run.

@@ -19,7 +19,8 @@ pub enum EvaluationStatus {
     /// Episodes are running.
     Running,
     /// All episodes are done; the score is being computed.
-    Finalising,
+    #[serde(rename = "finalising")]
+    Scoring,
     /// It has a score.
     Finished {
         /// When the score was stored.
@@ -57,7 +58,8 @@ pub enum EvaluationStatus {
     },
     /// The day's deadline came before the evaluation finished, for lack of server capacity. It does not count as the
     /// team's evaluation of the day.
-    NotPlayed {
+    #[serde(rename = "not_played")]
+    DeadlineMissed {
         /// When it was ended.
         finished_at: Timestamp,
         /// The deadline, in words.
@@ -90,7 +92,7 @@ impl EvaluationStatus {
                 "The remaining episodes run, then the score is computed. If they are not done by the day's deadline, \
              the evaluation is ended and does not count."
             }
-            Self::Finalising => "The score is computed and published automatically.",
+            Self::Scoring => "The score is computed and published automatically.",
             Self::Finished { .. } if is_released => Self::DONE,
             Self::Finished { .. } => {
                 "Dataset and details are released when the day's last evaluation has ended."
@@ -109,7 +111,7 @@ impl EvaluationStatus {
                 "The same submission is evaluated again on the same episodes: twice automatically, after one and after \
              ten minutes, then on an organiser's request."
             }
-            Self::NotPlayed { .. } => {
+            Self::DeadlineMissed { .. } => {
                 "It does not count as the team's evaluation of the day, and the row of an earlier day stays on the board. \
              The next cutoff evaluates the active submission. An organiser can still repeat this evaluation."
             }
@@ -123,7 +125,7 @@ impl EvaluationStatus {
     /// Whether the state is final.
     #[must_use]
     pub const fn is_final(&self) -> bool {
-        !matches!(self, Self::Queued | Self::Running | Self::Finalising)
+        !matches!(self, Self::Queued | Self::Running | Self::Scoring)
     }
 
     /// When the score was stored; `None` without a score.
@@ -245,7 +247,7 @@ mod tests {
             finished_at,
             reason: reason(),
         };
-        let not_played = EvaluationStatus::NotPlayed {
+        let deadline_missed = EvaluationStatus::DeadlineMissed {
             finished_at,
             reason: reason(),
         };
@@ -267,7 +269,7 @@ mod tests {
                 "The remaining episodes",
             ),
             (
-                &EvaluationStatus::Finalising,
+                &EvaluationStatus::Scoring,
                 false,
                 false,
                 "score is computed",
@@ -279,7 +281,12 @@ mod tests {
             (&agent_failed, true, false, "what to correct"),
             (&platform_failed, false, false, "twice automatically"),
             (&platform_failed, true, false, "can repeat it"),
-            (&not_played, true, false, "earlier day stays on the board"),
+            (
+                &deadline_missed,
+                true,
+                false,
+                "earlier day stays on the board",
+            ),
             (&cancelled, true, false, "does not count"),
         ] {
             let text = status.next(is_released, is_voided);

@@ -79,7 +79,8 @@ pub enum PurposeView {
         requested_by: TeamName,
     },
     /// A game of the schedule, replayed with another seed.
-    Replay {
+    #[serde(rename = "replay")]
+    ScheduleReplay {
         /// Number of the replay, from 1.
         replay: u32,
         /// The round of the replayed game.

@@ -1,6 +1,6 @@
 //! Liveness and readiness of the server: whether its process responds, and whether it can also serve requests and run jobs.
 
-use crate::views::ruling::RulingView;
+use crate::views::decision::DecisionView;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -18,7 +18,7 @@ pub struct HealthView {
     pub waiting: u32,
     /// If an organiser paused the queue: since when, and why; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub paused: Option<RulingView>,
+    pub paused: Option<DecisionView>,
 }
 
 /// Liveness: the server process responds.

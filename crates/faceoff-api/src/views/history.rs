@@ -1,7 +1,7 @@
 //! Board history: results and ranks of all teams of a stage, day by day. A *baseline* is a reference agent of the organisers. A *tier*
 //! says, by the penalty points, how safe an agent is for the real robot.
 
-use crate::views::{ruling::RulingView, task::TaskView};
+use crate::views::{decision::DecisionView, task::TaskView};
 use faceoff_types::{
     CountingResult, DivisionName, EvaluationId, StageId, StageName, Task, TeamId, TeamName, Tier,
 };
@@ -36,7 +36,7 @@ pub struct HistoryView {
     pub division: Option<DivisionName>,
     /// If the boards are frozen and newer results are left out: since when, and why; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub frozen: Option<RulingView>,
+    pub frozen: Option<DecisionView>,
     /// Days with results, earliest first.
     pub days: Vec<Date>,
     /// Earliest day first; within a day in board order.
@@ -60,8 +60,12 @@ pub struct HistoryRow {
     /// The team's rank by the results up to this day; null for a baseline.
     pub rank: Option<u32>,
     /// The rank that a baseline would have had; absent for other teams.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub would_rank: Option<u32>,
+    #[serde(
+        default,
+        rename = "would_rank",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub hypothetical_rank: Option<u32>,
     /// The day's evaluation.
     pub evaluation: EvaluationId,
     /// When the score was stored.

@@ -141,7 +141,8 @@ pub enum ProposedEvaluationStatus {
     /// Episodes are running.
     Running,
     /// The score is being computed.
-    Finalising,
+    #[serde(rename = "finalising")]
+    Scoring,
     /// It has a score.
     Finished {
         /// When the score was stored.

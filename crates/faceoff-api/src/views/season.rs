@@ -1,7 +1,9 @@
 //! The season: its stages and days, the seeds that are revealed, and its *commitment*, the published hash of the secret from
 //! which all seeds derive.
 
-use crate::views::{archive::ArchiveView, day::NextCutoff, ruling::RulingView, stage::StageView};
+use crate::views::{
+    archive::ArchiveView, day::NextCutoff, decision::DecisionView, stage::StageView,
+};
 use faceoff_types::{DivisionName, Seed, StageId, deprecated_names};
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
@@ -25,7 +27,7 @@ pub struct SeasonView {
     pub closed_at: Option<Timestamp>,
     /// If an organiser paused the queue: since when, and why. No job starts meanwhile. Absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub paused: Option<RulingView>,
+    pub paused: Option<DecisionView>,
     /// If the server shows an archive: when it was made; absent for a running season.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub archived: Option<ArchiveView>,

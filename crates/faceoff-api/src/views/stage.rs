@@ -1,7 +1,9 @@
 //! Stages: parts of the season, each with its own evaluation days, rules and board (table of results). Each day starts at
 //! a *cutoff*, when the submissions to evaluate are fixed.
 
-use crate::views::{capacity::DayLoad, day::NextCutoff, ruling::RulingView, sign_off::SignOffView};
+use crate::views::{
+    capacity::DayLoad, day::NextCutoff, decision::DecisionView, sign_off::SignOffView,
+};
 use faceoff_types::{
     IanaTimeZone, Retention, StageId, StageName, StageRules, StageSettings, deprecated_names,
 };
@@ -29,14 +31,15 @@ pub struct StageView {
     pub next_cutoff: Option<NextCutoff>,
     /// If its boards are frozen: since when, and why; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub frozen: Option<RulingView>,
+    pub frozen: Option<DecisionView>,
     /// Whether the seeds of its days derive from its id. False only for the first stage of a season that began with an
     /// older version.
     pub names_seeds: bool,
     /// Whether its rules and settings are read from the server's configuration at each start.
     pub configured: bool,
     /// When and by whom its result was signed off; the stage is final then. Null while its result is provisional.
-    pub finalised: Option<SignOffView>,
+    #[serde(rename = "finalised")]
+    pub sign_off: Option<SignOffView>,
     /// Which of its datasets and bundles are kept; `{}`: all.
     #[serde(default)]
     pub retention: Retention,

@@ -1,6 +1,6 @@
 //! Submissions, and the verdicts of their validation runs, which check whether an upload can be evaluated.
 
-use crate::views::{exclusion::StageExclusion, queue::QueueView, ruling::RulingView};
+use crate::views::{decision::DecisionView, exclusion::StageExclusion, queue::QueueView};
 use faceoff_types::{SubmissionId, TeamId, ValidationTiming, deprecated_names};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
@@ -49,7 +49,7 @@ pub struct SubmissionView {
     pub same_as: Option<SubmissionId>,
     /// If its bundle was removed: when, and why. It cannot be evaluated any more. Absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub bundle_removed: Option<RulingView>,
+    pub bundle_removed: Option<DecisionView>,
     /// If it was deleted: when, and by whom; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub deleted: Option<DeletionView>,
@@ -94,7 +94,8 @@ pub enum SubmissionStatus {
         log: Option<String>,
     },
     /// The validation run failed several times by a platform fault; upload the bundle again.
-    ValidationError {
+    #[serde(rename = "validation_error")]
+    PlatformFailed {
         /// What failed.
         reason: String,
     },
@@ -119,7 +120,7 @@ impl SubmissionStatus {
             Self::Invalid { .. } => {
                 "Rejected, and its bundle was deleted. Fix the error in the reason and upload again."
             }
-            Self::ValidationError { .. } => {
+            Self::PlatformFailed { .. } => {
                 "The validation run failed because of a platform fault. Upload the bundle again; this one does not count as a \
              pending submission."
             }
@@ -165,7 +166,7 @@ mod tests {
                 "upload again",
             ),
             (
-                SubmissionStatus::ValidationError { reason: reason() },
+                SubmissionStatus::PlatformFailed { reason: reason() },
                 false,
                 false,
                 "platform fault",

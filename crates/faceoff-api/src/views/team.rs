@@ -1,6 +1,6 @@
 //! Teams, and their first tokens.
 
-use crate::views::ruling::RulingView;
+use crate::views::decision::DecisionView;
 use faceoff_types::{DivisionName, TeamId, TeamName};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
@@ -18,7 +18,7 @@ pub struct TeamView {
     pub created_at: Timestamp,
     /// If the team is disqualified, and neither evaluated nor ranked: since when, and why; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub disqualified: Option<RulingView>,
+    pub disqualified: Option<DecisionView>,
     /// The team's institution or company; null if not given.
     #[serde(default)]
     pub affiliation: Option<String>,

@@ -1,7 +1,7 @@
 //! Tournaments: rules, entrants (the teams that take part), rounds and standings. A round is divided into *matchdays*, on
 //! each of which a team meets at most one opponent; a team without an opponent on a matchday has a *bye*.
 
-use crate::views::ruling::RulingView;
+use crate::views::decision::DecisionView;
 use faceoff_scoring::tournament::schedule::Table;
 use faceoff_types::{
     DepartureKind, RoundNumber, StageId, StageName, SubmissionId, TeamId, TeamName, TournamentId,
@@ -27,7 +27,7 @@ pub struct TournamentHead {
     /// The stage that qualified its first entrants; null: an organiser named them.
     pub stage: Option<StageId>,
     /// If it is paused and no game starts: since when, and why; null otherwise.
-    pub paused: Option<RulingView>,
+    pub paused: Option<DecisionView>,
     /// When it was closed and became final; null before.
     pub closed_at: Option<Timestamp>,
     /// The first team of the table that decides the tournament, once all rounds are over; null before.
@@ -93,7 +93,8 @@ deprecated_names!(EntrantView { left => departure });
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct DepartureView {
     /// Whether it withdrew or was disqualified.
-    pub r#as: DepartureKind,
+    #[serde(rename = "as")]
+    pub kind: DepartureKind,
     /// The first round whose games against it do not count.
     #[schema(value_type = u32, minimum = 1, maximum = 100)]
     pub from_round: RoundNumber,

@@ -7,7 +7,7 @@ use arrow_array::{
     cast::AsArray,
     types::{Float64Type, Int64Type},
 };
-use faceoff_airhockey::{Effect, RallyEntry, Response, SideFault, action_space};
+use faceoff_airhockey::{Effect, RallyReadiness, Response, SideFault, action_space};
 use faceoff_episode::AnswerTiming;
 use faceoff_sim::Interpolation;
 use faceoff_types::{ACTION_LIMIT, AgentFault, AgentFaultKind, AgentTask, Side};
@@ -43,7 +43,7 @@ impl RowLocation {
 /// How one side entered a rally (start and reset of its agent), and the side's fault in the rally.
 #[derive(Debug)]
 pub(super) struct RecordedEntry {
-    pub entry: RallyEntry,
+    pub readiness: RallyReadiness,
     /// The fault at one of the rally's steps.
     pub step_fault: Option<AgentFault>,
 }
@@ -104,30 +104,30 @@ impl RecordedEntry {
             _ => {}
         }
         let started = fault.as_ref().is_none_or(|fault| fault.episode.is_some());
-        let (entry, step_fault) = match (startup_s, interpolation, reset_s) {
+        let (readiness, step_fault) = match (startup_s, interpolation, reset_s) {
             (Some(startup_s), None, None) if !started => {
                 let fault = fault.map(side_fault).ok_or_else(|| {
                     location.difference("fault", "nothing", "the fault that prevented the start")
                 })?;
-                (RallyEntry::StartFailed { startup_s, fault }, None)
+                (RallyReadiness::StartFailed { startup_s, fault }, None)
             }
             (startup_s, Some(interpolation), Some(reset_s)) if started => match fault {
                 Some(fault) if fault.step.is_none() => {
-                    let entry = RallyEntry::ResetFailed {
+                    let readiness = RallyReadiness::ResetFailed {
                         startup_s,
                         interpolation,
                         reset_s,
                         fault: side_fault(fault),
                     };
-                    (entry, None)
+                    (readiness, None)
                 }
                 step_fault => {
-                    let entry = RallyEntry::Ready {
+                    let readiness = RallyReadiness::Ready {
                         startup_s,
                         interpolation,
                         reset_s,
                     };
-                    (entry, step_fault)
+                    (readiness, step_fault)
                 }
             },
             (_, interpolation, _) => {
@@ -140,7 +140,10 @@ impl RecordedEntry {
                 return Err(location.difference("interpolation", recorded, expected));
             }
         };
-        Ok(Self { entry, step_fault })
+        Ok(Self {
+            readiness,
+            step_fault,
+        })
     }
 }
 

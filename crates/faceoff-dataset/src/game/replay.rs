@@ -158,15 +158,19 @@ impl GameReplay {
         };
         let [(first_row, first), (second_row, second)] = [read(Side::First)?, read(Side::Second)?];
         // The interpolation of a side that failed to start is not used.
-        let interpolation =
-            |entry: &RecordedEntry| entry.entry.interpolation().unwrap_or(Interpolation::Cubic);
+        let interpolation = |entry: &RecordedEntry| {
+            entry
+                .readiness
+                .interpolation()
+                .unwrap_or(Interpolation::Cubic)
+        };
         let recorded = RecordedRally {
             entries: [first_row, second_row],
             interpolations: [interpolation(&first), interpolation(&second)],
             faults: [first.step_fault, second.step_fault],
         };
         self.game
-            .start_rally([first.entry, second.entry])
+            .start_rally([first.readiness, second.readiness])
             .map_err(unbuildable_row)?;
         Ok(recorded)
     }

@@ -10,7 +10,7 @@ use arrow_array::{
     },
 };
 use arrow_schema::{DataType, Field, Schema, SchemaRef};
-use faceoff_airhockey::{GameStepRow, RallyEntry, RallyRow, RallyStart, recording_columns};
+use faceoff_airhockey::{GameStepRow, RallyReadiness, RallyRow, RallyStart, recording_columns};
 use faceoff_episode::StateColumns;
 use faceoff_types::{AgentFault, Side};
 use std::sync::Arc;
@@ -314,20 +314,20 @@ impl EntryRows {
     }
 
     pub fn begin(&mut self, start: &RallyStart<'_>) {
-        let entry = &start.entries[self.side.index()];
-        let (startup_s, reset_s) = match entry {
-            RallyEntry::Ready {
+        let readiness = &start.readiness[self.side.index()];
+        let (startup_s, reset_s) = match readiness {
+            RallyReadiness::Ready {
                 startup_s, reset_s, ..
             }
-            | RallyEntry::ResetFailed {
+            | RallyReadiness::ResetFailed {
                 startup_s, reset_s, ..
             } => (*startup_s, Some(*reset_s)),
-            RallyEntry::StartFailed { startup_s, .. } => (Some(*startup_s), None),
+            RallyReadiness::StartFailed { startup_s, .. } => (Some(*startup_s), None),
         };
         self.rallies.append_value(start.rally);
         self.startups.append_option(startup_s.map(nanoseconds));
         self.interpolations
-            .append_option(entry.interpolation().map(|code| code.to_string()));
+            .append_option(readiness.interpolation().map(|code| code.to_string()));
         self.resets.append_option(reset_s.map(nanoseconds));
     }
 

@@ -160,23 +160,29 @@ fn clip_index_matches_the_dataset_for_each_episode() {
     let violations = fixture.dataset.violations().unwrap();
     let mut compared = 0;
     for outcome in &outcomes {
-        let line = index.line(outcome.task, outcome.episode).unwrap();
+        let summary = index.summary(outcome.task, outcome.episode).unwrap();
         assert_eq!(
-            (line.steps, line.success, line.end),
+            (summary.steps, summary.success, summary.end),
             (outcome.steps, outcome.success, outcome.end)
         );
-        assert!(!line.why.is_empty());
+        assert!(!summary.end_description.is_empty());
         let motion = clip(
             &fixture.pack,
             ClipKey::motion(outcome.task, outcome.episode),
         );
-        assert_eq!(motion.header.end.unwrap().why, line.why);
+        assert_eq!(
+            motion.header.end.unwrap().description,
+            summary.end_description
+        );
         let task_violations = &violations.tasks[&outcome.task];
         for name in [EE, LINK, JOINT_POS, JOINT_VEL] {
             let recorded = task_violations.constraints[&name]
                 .iter()
                 .find(|violation| violation.episode == outcome.episode);
-            let found = line.broken.iter().find(|violation| violation.group == name);
+            let found = summary
+                .violations
+                .iter()
+                .find(|violation| violation.group == name);
             match (recorded, found) {
                 (None, None) => {}
                 (Some(recorded), Some(found)) => {

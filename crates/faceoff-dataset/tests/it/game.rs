@@ -6,7 +6,7 @@ use crate::{
 };
 use arrow_array::{Array, RecordBatch, cast::AsArray, types::Float64Type};
 use faceoff_airhockey::EVALUATION;
-use faceoff_airhockey::{RallyEntry, Response, RunningGame, SideFault, SimulationSetup};
+use faceoff_airhockey::{RallyReadiness, Response, RunningGame, SideFault, SimulationSetup};
 use faceoff_dataset::{
     DatasetError,
     game::{GAME_FILE, GameRecorder, GameRecording, RecordedGame, side_file, verify_game},
@@ -60,32 +60,32 @@ fn record(out: &Path) {
     };
     while game.end().is_none() {
         let rally = game.rally();
-        let entries = Side::BOTH.map(|side| {
+        let readiness = Side::BOTH.map(|side| {
             let startup_s = game.needs_start(side).then_some(0.25);
             let interpolation = match (rally, side) {
                 (0, _) => Interpolation::Cubic,
                 _ => Interpolation::Linear,
             };
             match (rally, side) {
-                (1, Side::Second) => RallyEntry::ResetFailed {
+                (1, Side::Second) => RallyReadiness::ResetFailed {
                     startup_s,
                     interpolation,
                     reset_s: 0.125,
                     fault: fault("reset"),
                 },
-                (2, Side::First) if startup_s.is_some() => RallyEntry::StartFailed {
+                (2, Side::First) if startup_s.is_some() => RallyReadiness::StartFailed {
                     startup_s: 0.5,
                     fault: fault("start"),
                 },
-                _ => RallyEntry::Ready {
+                _ => RallyReadiness::Ready {
                     startup_s,
                     interpolation,
                     reset_s: 0.0625,
                 },
             }
         });
-        let interpolations = entries.each_ref().map(RallyEntry::interpolation);
-        game.start_rally(entries).unwrap();
+        let interpolations = readiness.each_ref().map(RallyReadiness::interpolation);
+        game.start_rally(readiness).unwrap();
         while game.is_in_rally() {
             let step = game.rally_steps();
             let actions = Side::BOTH.map(|side| {

@@ -107,7 +107,7 @@ fn shards_of_other_magnitudes_are_not_joined() {
 #[test]
 fn unreachable_robot_is_detected_in_advance() {
     let seed = faceoff_types::Seed::from_number(7).model_mismatch();
-    let check = |magnitudes: &Magnitudes| simulator().check_playable(magnitudes, seed);
+    let check = |magnitudes: &Magnitudes| simulator().check_season_magnitudes(magnitudes, seed);
     let mut magnitudes = Magnitudes::default();
     assert_eq!(check(&magnitudes), Ok(()));
     assert_eq!(check(&large_variation().perturbations), Ok(()));

@@ -361,8 +361,10 @@ async fn extra_evaluation_is_confirmed_when_it_replaces_one() {
     );
 
     let disqualify = format!("/api/v1/teams/{}/disqualify", beta.id);
-    let ruling = json!({ "reason": "cheating", "confirm": "Beta" });
-    site.post(&disqualify, Some(ADMIN), &ruling).await.json(200);
+    let decision = json!({ "reason": "cheating", "confirm": "Beta" });
+    site.post(&disqualify, Some(ADMIN), &decision)
+        .await
+        .json(200);
     let mut confirmed_request = beta_request.clone();
     confirmed_request["confirm"] = json!("Beta");
     site.post(&path, Some(ADMIN), &confirmed_request)

@@ -168,9 +168,9 @@ async fn board_of_a_division_ranks_its_teams() {
 
     // A disqualified team leaves its division's board, and is listed on no other division's board.
     let id = team_id(&site, "C").await;
-    let ruling = json!({ "reason": "two bundles", "confirm": "C" });
+    let decision = json!({ "reason": "two bundles", "confirm": "C" });
     let path = format!("/api/v1/teams/{id}/disqualify");
-    site.post(&path, Some(ADMIN), &ruling).await.json(200);
+    site.post(&path, Some(ADMIN), &decision).await.json(200);
     for (division, remaining, disqualified) in [
         ("Bachelor%20students", &["A"][..], 1),
         ("Open", &["B"][..], 0),

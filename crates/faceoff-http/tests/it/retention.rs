@@ -342,8 +342,10 @@ async fn organiser_deletes_with_a_reason_but_not_evidence() {
     assert_eq!(deleted["deleted"]["by"], "organiser");
 
     let disqualify = format!("/api/v1/teams/{}/disqualify", team.id);
-    let ruling = json!({ "reason": "it spied", "confirm": "Alpha" });
-    site.post(&disqualify, Some(ADMIN), &ruling).await.json(200);
+    let decision = json!({ "reason": "it spied", "confirm": "Alpha" });
+    site.post(&disqualify, Some(ADMIN), &decision)
+        .await
+        .json(200);
     for token in [team_token, Some(ADMIN)] {
         delete(&site, &second, token, request.clone())
             .await

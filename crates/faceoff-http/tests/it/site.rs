@@ -325,7 +325,7 @@ impl Site {
                 .unwrap()
         );
         store
-            .name_season(Actor::Organiser, "Test season", start)
+            .name_season(Actor::Host, "Test season", start)
             .await
             .unwrap();
         let schedule = daily_at.map(Schedule::daily);
@@ -608,7 +608,7 @@ impl Site {
     pub async fn evaluate(&self, team: &TestTeam, submission: &str) -> String {
         match self
             .store
-            .start_day(Actor::Organiser, self.stage().await, self.now())
+            .start_day(Actor::Host, self.stage().await, self.now())
             .await
         {
             Ok(_) | Err(StoreError::CutoffPassed { .. }) => {}
@@ -704,7 +704,7 @@ impl Site {
             ..plan()
         };
         let stage = configure_stage(&self.store, &plan, None, self.now()).await;
-        let started = self.store.start_day(Actor::Organiser, stage, self.now());
+        let started = self.store.start_day(Actor::Host, stage, self.now());
         let started = started.await.unwrap();
         let mut by_name = BTreeMap::new();
         for evaluation in &started {

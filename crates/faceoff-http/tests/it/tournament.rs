@@ -13,5 +13,5 @@ mod live;
 mod organiser_pages;
 mod pages;
 mod paper_results;
-mod replays;
+mod schedule_replays;
 mod test_games;

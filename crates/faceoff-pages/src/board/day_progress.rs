@@ -89,7 +89,7 @@ impl DayProgress {
             }
             EvaluationStatus::Queued => ("Queued", &mut self.queued),
             EvaluationStatus::Running => ("Running", &mut self.running),
-            EvaluationStatus::Finalising => ("Computing the score", &mut self.running),
+            EvaluationStatus::Scoring => ("Computing the score", &mut self.running),
             EvaluationStatus::AgentFailed { .. } => (
                 "Agent failed; the team sees the reason when the day is released",
                 &mut self.ended_without_result,
@@ -98,7 +98,7 @@ impl DayProgress {
                 "Stopped by a platform fault",
                 &mut self.ended_without_result,
             ),
-            EvaluationStatus::NotPlayed { .. } => (
+            EvaluationStatus::DeadlineMissed { .. } => (
                 "Not evaluated in time: the server was at capacity",
                 &mut self.ended_without_result,
             ),

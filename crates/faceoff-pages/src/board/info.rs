@@ -9,7 +9,7 @@ use crate::{
 use faceoff_api::views::{
     board::BoardView,
     day::NextCutoff,
-    ruling::RulingView,
+    decision::DecisionView,
     stage::{PhaseView, StageView},
 };
 use faceoff_service::{
@@ -38,9 +38,9 @@ pub(super) struct BoardInfo {
     /// Query of this board with all teams.
     pub(super) all_teams: String,
     /// The queue is paused.
-    pub(super) paused: Option<RulingView>,
+    pub(super) paused: Option<DecisionView>,
     /// The organisers have *frozen* the board: it hides all later results.
-    pub(super) frozen: Option<RulingView>,
+    pub(super) frozen: Option<DecisionView>,
     /// What a row contains, for the caption of the table.
     pub(super) rows_caption: String,
     /// The shares of the tasks in the score, as a sum.
@@ -85,7 +85,7 @@ impl BoardInfo {
         board: &BoardView,
         visibility: &Visibility,
         address: &Address<'_>,
-        paused: Option<RulingView>,
+        paused: Option<DecisionView>,
     ) -> Result<Self, PageProblem> {
         let is_hidden = visibility.is_hidden(board.stage);
         let stages = stage::all(app).await?;

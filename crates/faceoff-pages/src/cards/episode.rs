@@ -52,13 +52,13 @@ async fn load(app: &App, path: EpisodePath) -> Result<Card, PageProblem> {
     );
     let day = clips.evaluation.stage_day.date.to_string();
     card.text(&day, &soft, [LEFT, y + 38.0], TEXT_WIDTH);
-    let (verdict, colour) = match clip.line.success {
+    let (verdict, colour) = match clip.summary.success {
         true => ("Success", "good"),
         false => ("No success", "poor"),
     };
     let large = text_style(Weight::Semibold, 48.0, colour);
     card.text(verdict, &large, [LEFT, y + 122.0], TEXT_WIDTH);
-    let reason = plain_end(&clip.line, &clip.motion.header.contacts);
+    let reason = plain_end(&clip.summary, &clip.motion.header.contacts);
     let ink = text_style(Weight::Regular, 34.0, "ink");
     card.paragraph(&reason, &ink, [LEFT, y + 174.0], (TEXT_WIDTH, 4));
     let [x, width] = DRAWING;

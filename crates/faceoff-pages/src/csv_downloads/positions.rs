@@ -14,8 +14,8 @@ pub(super) fn state_columns() -> impl Iterator<Item = String> {
 }
 
 /// The cells of [`state_columns`].
-pub(super) fn states(line: &EpisodeLine) -> impl Iterator<Item = String> {
-    let states = [line.start, line.last].into_iter();
+pub(super) fn states(summary: &EpisodeLine) -> impl Iterator<Item = String> {
+    let states = [summary.start, summary.last].into_iter();
     let numbers = states.flat_map(|state| state.map_or([None; 4], |state| state.map(Some)));
     numbers.map(or_empty)
 }

@@ -65,7 +65,7 @@ fn evaluation_row(visibility: &Visibility, view: EvaluationView) -> EvaluationRo
     row.state = match view.status {
         EvaluationStatus::Queued => "waiting for a free slot".to_owned(),
         EvaluationStatus::Running => "running".to_owned(),
-        EvaluationStatus::Finalising => "computing the score".to_owned(),
+        EvaluationStatus::Scoring => "computing the score".to_owned(),
         EvaluationStatus::Finished { .. } | EvaluationStatus::AgentFailed { .. } if view.blind => {
             finished_blind.to_owned()
         }
@@ -98,7 +98,7 @@ fn evaluation_row(visibility: &Visibility, view: EvaluationView) -> EvaluationRo
             "stopped after agent faults, no score".to_owned()
         }
         EvaluationStatus::PlatformFailed { .. } => "platform fault".to_owned(),
-        EvaluationStatus::NotPlayed { .. } => "not evaluated in time".to_owned(),
+        EvaluationStatus::DeadlineMissed { .. } => "not evaluated in time".to_owned(),
         EvaluationStatus::Cancelled {
             finished_at,
             reason,
@@ -106,8 +106,9 @@ fn evaluation_row(visibility: &Visibility, view: EvaluationView) -> EvaluationRo
             format!("cancelled {}: {reason}", utc_minute(finished_at))
         }
     };
-    if let Some(ruling) = view.voided {
-        row.state.push_str(&format!("; voided: {}", ruling.reason));
+    if let Some(decision) = view.voided {
+        row.state
+            .push_str(&format!("; voided: {}", decision.reason));
     }
     row
 }

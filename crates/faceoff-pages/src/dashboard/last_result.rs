@@ -83,33 +83,33 @@ async fn worst_failed(
     row: &BoardRow,
 ) -> Result<Vec<FailedEpisode>, Problem> {
     let clips = Clips::find(app, visibility, row.evaluation).await?;
-    let mut lines = clips.episodes().await?.episodes;
-    lines.retain(|line| !line.success && line.has_clips());
-    lines.sort_by_key(|line| Reverse(badness(line)));
+    let mut summaries = clips.episodes().await?.episodes;
+    summaries.retain(|summary| !summary.success && summary.has_clips());
+    summaries.sort_by_key(|summary| Reverse(badness(summary)));
     let mut tasks = Vec::new();
     let (mut worst, others): (Vec<EpisodeLine>, Vec<EpisodeLine>) =
-        lines.into_iter().partition(|line| {
-            let is_first = !tasks.contains(&line.task);
-            tasks.push(line.task);
+        summaries.into_iter().partition(|summary| {
+            let is_first = !tasks.contains(&summary.task);
+            tasks.push(summary.task);
             is_first
         });
     worst.extend(others);
     worst.truncate(MAX_FAILED);
     let mut failed = Vec::new();
-    for line in worst {
-        let episode = clips.episode(line.task, line.episode).await?;
+    for summary in worst {
+        let episode = clips.episode(summary.task, summary.episode).await?;
         failed.push(FailedEpisode {
-            task: line.task,
-            episode: line.episode,
-            path: page_path(row.evaluation, line.task, line.episode),
-            violations: line.broken.len(),
-            end_reason: plain_end(&line, &episode.motion.header.contacts),
+            task: summary.task,
+            episode: summary.episode,
+            path: page_path(row.evaluation, summary.task, summary.episode),
+            violations: summary.violations.len(),
+            end_reason: plain_end(&summary, &episode.motion.header.contacts),
             still: Still::new(&episode.motion, None),
         });
     }
     Ok(failed)
 }
 
-fn badness(line: &EpisodeLine) -> (usize, u32) {
-    (line.broken.len(), line.late)
+fn badness(summary: &EpisodeLine) -> (usize, u32) {
+    (summary.violations.len(), summary.late_answers)
 }

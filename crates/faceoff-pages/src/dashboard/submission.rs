@@ -101,7 +101,7 @@ async fn page_with(
     let view = submission::build(app, submission).await?;
     let log = match &view.status {
         SubmissionStatus::Valid { log } | SubmissionStatus::Invalid { log, .. } => log.clone(),
-        SubmissionStatus::Validating | SubmissionStatus::ValidationError { .. } => None,
+        SubmissionStatus::Validating | SubmissionStatus::PlatformFailed { .. } => None,
     };
     let form = form.unwrap_or_else(|| DescriptionForm {
         label: view.label.clone().unwrap_or_default(),

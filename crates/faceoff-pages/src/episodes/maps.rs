@@ -24,8 +24,8 @@ pub(super) struct EpisodeLink {
 }
 
 impl EpisodeLink {
-    fn new(line: &EpisodeLine, position: Position, what: &str) -> Self {
-        let EpisodeLine { task, episode, .. } = line;
+    fn new(summary: &EpisodeLine, position: Position, what: &str) -> Self {
+        let EpisodeLine { task, episode, .. } = summary;
         Self {
             address: format!("episodes/{task}/{episode}"),
             name: format!("{task} {episode}: {what}"),
@@ -68,36 +68,38 @@ pub(super) struct SuccessRow {
 }
 
 impl StartMap {
-    pub(super) fn new(task: Task, lines: &[&EpisodeLine]) -> Option<Self> {
-        let lines: Vec<&EpisodeLine> = lines
+    pub(super) fn new(task: Task, summaries: &[&EpisodeLine]) -> Option<Self> {
+        let summaries: Vec<&EpisodeLine> = summaries
             .iter()
             .copied()
-            .filter(|line| line.task == task && line.has_clips())
+            .filter(|summary| summary.task == task && summary.has_clips())
             .collect();
-        if lines.is_empty() {
+        if summaries.is_empty() {
             return None;
         }
         let starts = |success: bool| -> Vec<Position> {
-            let episodes = lines.iter().filter(|line| line.success == success);
+            let episodes = summaries
+                .iter()
+                .filter(|summary| summary.success == success);
             episodes
-                .filter_map(|line| line.start)
+                .filter_map(|summary| summary.start)
                 .map(|[x, y, ..]| [x, y])
                 .collect()
         };
         let (solved, failed) = (starts(true), starts(false));
         let has_all = solved.len() + failed.len() <= MAX_LINKS;
         let has_failed = failed.len() <= MAX_LINKS;
-        let linked = lines.iter().filter(|line| match line.success {
+        let linked = summaries.iter().filter(|summary| match summary.success {
             true => has_all,
             false => has_failed,
         });
-        let links = linked.filter_map(|line| {
-            let [x, y, ..] = line.start?;
-            let what = match line.success {
+        let links = linked.filter_map(|summary| {
+            let [x, y, ..] = summary.start?;
+            let what = match summary.success {
                 true => "solved",
                 false => "not solved",
             };
-            Some(EpisodeLink::new(line, [x, y], what))
+            Some(EpisodeLink::new(summary, [x, y], what))
         });
         Some(Self {
             task,
@@ -116,13 +118,13 @@ impl StartMap {
                     id: format!("across-{task}"),
                     caption: "Success by start position across the table",
                     value: "y",
-                    rows: success_by(&lines, |[_, y, ..]| y, "m", 0.2),
+                    rows: success_by(&summaries, |[_, y, ..]| y, "m", 0.2),
                 },
                 SuccessTable {
                     id: format!("speed-{task}"),
                     caption: "Success by speed of the puck at the start",
                     value: "Speed",
-                    rows: success_by(&lines, speed, "m/s", 0.5),
+                    rows: success_by(&summaries, speed, "m/s", 0.5),
                 },
             ]
             .into_iter()
@@ -139,13 +141,13 @@ fn speed([_, _, vx, vy]: [f64; 4]) -> f64 {
 
 /// Success by classes of a value, each `width` wide. Empty classes are omitted; a single class gives no rows.
 fn success_by(
-    lines: &[&EpisodeLine],
+    summaries: &[&EpisodeLine],
     value: impl Fn([f64; 4]) -> f64,
     unit: &str,
     width: f64,
 ) -> Vec<SuccessRow> {
-    let class = |line: &EpisodeLine| (value(line.start.unwrap_or_default()) / width).floor();
-    let mut classes: Vec<f64> = lines.iter().map(|line| class(line)).collect();
+    let class = |summary: &EpisodeLine| (value(summary.start.unwrap_or_default()) / width).floor();
+    let mut classes: Vec<f64> = summaries.iter().map(|summary| class(summary)).collect();
     classes.sort_by(f64::total_cmp);
     classes.dedup();
     if classes.len() < 2 {
@@ -154,11 +156,11 @@ fn success_by(
     classes
         .into_iter()
         .map(|class_number| {
-            let inside: Vec<_> = lines
+            let inside: Vec<_> = summaries
                 .iter()
-                .filter(|line| class(line).total_cmp(&class_number).is_eq())
+                .filter(|summary| class(summary).total_cmp(&class_number).is_eq())
                 .collect();
-            let solved = inside.iter().filter(|line| line.success).count();
+            let solved = inside.iter().filter(|summary| summary.success).count();
             SuccessRow {
                 range: format!(
                     "{} … {} {unit}",
@@ -193,18 +195,18 @@ pub(super) struct Joint {
 }
 
 impl ViolationMap {
-    pub(super) fn new(lines: &[&EpisodeLine]) -> Self {
-        let violations = || lines.iter().flat_map(|line| &line.broken);
+    pub(super) fn new(summaries: &[&EpisodeLine]) -> Self {
+        let violations = || summaries.iter().flat_map(|summary| &summary.violations);
         let marks = ViolationMarks::by_group(|group| {
             let matching = violations().filter(|violation| violation.group == group.name());
             matching.filter_map(|violation| violation.at).collect()
         });
-        let links = lines.iter().flat_map(|line| {
-            let violations = line.broken.iter();
+        let links = summaries.iter().flat_map(|summary| {
+            let violations = summary.violations.iter();
             violations.filter_map(|violation| {
                 let mut groups = Group::ALL.into_iter();
                 let group = groups.find(|group| group.name() == violation.group)?;
-                Some(EpisodeLink::new(line, violation.at?, group_label(group)))
+                Some(EpisodeLink::new(summary, violation.at?, group_label(group)))
             })
         });
         let mut links: Vec<_> = links.take(MAX_LINKS + 1).collect();
@@ -234,7 +236,10 @@ impl ViolationMap {
             links,
             note,
             joints,
-            episodes: lines.iter().filter(|line| !line.broken.is_empty()).count(),
+            episodes: summaries
+                .iter()
+                .filter(|summary| !summary.violations.is_empty())
+                .count(),
         }
     }
 }

@@ -25,26 +25,26 @@ impl Row {
     pub(super) fn new(
         competition: &Competition,
         id: EvaluationId,
-        line: &EpisodeLine,
+        summary: &EpisodeLine,
         still_version: &str,
     ) -> Self {
-        let EpisodeLine { task, episode, .. } = line;
+        let EpisodeLine { task, episode, .. } = summary;
         Self {
             task: *task,
             episode: *episode,
-            path: line.has_clips().then(|| page_path(id, *task, *episode)),
-            still: line
+            path: summary.has_clips().then(|| page_path(id, *task, *episode)),
+            still: summary
                 .has_clips()
                 .then(|| still::address(id, *task, *episode, still_version)),
-            success: line.success,
-            end_reason: line.why.clone(),
-            violations: line
-                .broken
+            success: summary.success,
+            end_reason: summary.end_description.clone(),
+            violations: summary
+                .violations
                 .iter()
                 .map(|violation| describe_violation(competition, violation))
                 .collect(),
-            duration_s: format!("{:.2}", competition.duration_s(*task, line.steps)),
-            slowest_ms: line.longest_s.map(figures::milliseconds),
+            duration_s: format!("{:.2}", competition.duration_s(*task, summary.steps)),
+            slowest_ms: summary.longest_s.map(figures::milliseconds),
         }
     }
 }

@@ -28,9 +28,9 @@ pub(super) struct GameReplay {
     pub(super) teams: [String; 2],
     pub(super) tournament: String,
     /// Address of the clips of the motion, with `{chunk}` for the number of the chunk.
-    pub(super) motion: String,
+    pub(super) motion_url: String,
     /// Address of the clips of observations and commands, if the viewer may see those of a side.
-    pub(super) observed: Option<String>,
+    pub(super) observed_url: Option<String>,
     /// Control steps of the game, plus one.
     pub(super) samples: u32,
     /// Ends of rallies and violations of the whole game as JSON; `None` if results are hidden.
@@ -78,7 +78,7 @@ pub(crate) async fn embedded(
         frame: Frame::new(String::new(), ""),
         id,
         replay: GameReplay {
-            observed: None,
+            observed_url: None,
             is_embedded: true,
             ..GameReplay::new(&view, &clips, result.steps, Some(&analysis))
         },
@@ -104,8 +104,8 @@ impl GameReplay {
         Self {
             teams: view.sides.each_ref().map(|side| side.team_name.to_string()),
             tournament: view.tournament_name.to_string(),
-            motion: format!("{api}/motion/{{chunk}}"),
-            observed: visible_side
+            motion_url: format!("{api}/motion/{{chunk}}"),
+            observed_url: visible_side
                 .map(|side| format!("{api}/sides/{}/observed/{{chunk}}", side.number())),
             samples: steps.saturating_add(1),
             course: analysis.map(course),

@@ -80,14 +80,14 @@ async fn server_items(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Prob
     match health::check(app).await {
         Ok(health) => {
             queue = Some((health.running, health.waiting));
-            if let Some(ruling) = health.paused {
+            if let Some(decision) = health.paused {
                 items.push(Item {
                     class: "waiting",
                     title: "The queue is paused".to_owned(),
                     detail: format!(
                         "Since {} ({}). No new jobs start; queued jobs: {}.",
-                        utc_minute(ruling.at),
-                        ruling.reason,
+                        utc_minute(decision.at),
+                        decision.reason,
                         health.waiting
                     ),
                     links: vec![("/organiser/decide/resume".into(), "Resume the queue".into())],
@@ -267,7 +267,7 @@ async fn failures(app: &App, day: StageDay) -> Result<Vec<Item>, Problem> {
             EvaluationStatus::PlatformFailed { reason, .. } => {
                 ("failed because of a platform fault", reason)
             }
-            EvaluationStatus::NotPlayed { reason, .. } => ("was not finished in time", reason),
+            EvaluationStatus::DeadlineMissed { reason, .. } => ("was not finished in time", reason),
             _ => return None,
         };
         Some(Item {

@@ -10,8 +10,8 @@ use crate::{
 use askama::Template;
 use axum::{extract::State, response::Response};
 use faceoff_api::views::{
+    decision::DecisionView,
     evaluation::{EvaluationStatus, EvaluationView},
-    ruling::RulingView,
 };
 use faceoff_service::{
     app::App,
@@ -46,7 +46,7 @@ struct Page {
     /// Is it a past date without a cutoff?
     was_missed: bool,
     is_signed_off: bool,
-    paused: Option<RulingView>,
+    paused: Option<DecisionView>,
     slots: u32,
     /// Running and queued jobs, if known.
     queue: Option<(u32, u32)>,
@@ -100,7 +100,7 @@ fn row(view: EvaluationView, replaced: &BTreeSet<EvaluationId>) -> Row {
         _ if view.voided.is_some() => ("voided", "plain", None, None),
         EvaluationStatus::Queued => ("queued", "plain", None, None),
         EvaluationStatus::Running => ("running", "waiting", None, None),
-        EvaluationStatus::Finalising => ("scoring", "waiting", None, None),
+        EvaluationStatus::Scoring => ("scoring", "waiting", None, None),
         EvaluationStatus::Finished { ref result, .. } => {
             let score = result
                 .as_ref()
@@ -111,7 +111,7 @@ fn row(view: EvaluationView, replaced: &BTreeSet<EvaluationId>) -> Row {
         EvaluationStatus::PlatformFailed { ref reason, .. } => {
             ("platform fault", "bad", Some(reason.clone()), None)
         }
-        EvaluationStatus::NotPlayed { ref reason, .. } => {
+        EvaluationStatus::DeadlineMissed { ref reason, .. } => {
             ("not finished in time", "bad", Some(reason.clone()), None)
         }
         EvaluationStatus::Cancelled { ref reason, .. } => {
@@ -124,7 +124,7 @@ fn row(view: EvaluationView, replaced: &BTreeSet<EvaluationId>) -> Row {
     );
     let is_counted = has_verdict && view.voided.is_none();
     let expected_end = view.queue.and_then(|queue| queue.expected_at);
-    let voided = view.voided.map(|ruling| ruling.reason);
+    let voided = view.voided.map(|decision| decision.reason);
     let extra = view
         .extra_evaluation
         .map(|reason| format!("extra evaluation: {reason}"));
@@ -180,12 +180,12 @@ pub(super) async fn page(
     let day = days.iter().find(|day| day.stage_day == stage_day);
     let view = day::build(&app, stage_day).await?;
     let replaced: BTreeSet<EvaluationId> = view
-        .created
+        .evaluations
         .iter()
         .filter_map(|evaluation| evaluation.rerun_of)
         .collect();
     let rows: Vec<Row> = view
-        .created
+        .evaluations
         .into_iter()
         .map(|evaluation| row(evaluation, &replaced))
         .collect();

@@ -36,7 +36,7 @@ struct Page {
 
 impl Page {
     fn phase(&self, stage: &StageView) -> &'static str {
-        board_status::phase_label(stage.phase, stage.finalised.is_some())
+        board_status::phase_label(stage.phase, stage.sign_off.is_some())
     }
 }
 

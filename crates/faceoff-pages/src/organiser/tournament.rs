@@ -56,7 +56,7 @@ impl Page {
     fn can_disqualify(&self, entrant: &EntrantView) -> bool {
         let has_started = !self.view.rounds.is_empty();
         let departure = entrant.departure.as_ref();
-        departure.is_none_or(|departure| has_started && departure.r#as == DepartureKind::Withdrawn)
+        departure.is_none_or(|departure| has_started && departure.kind == DepartureKind::Withdrawn)
     }
 }
 

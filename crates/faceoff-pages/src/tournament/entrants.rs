@@ -41,7 +41,7 @@ pub(super) async fn entrants(
             });
         }
         let departure = entrant.departure.as_ref().map(|departure| {
-            let kind = departure_label(departure.r#as);
+            let kind = departure_label(departure.kind);
             let from = departure.from_round;
             match spoilers.hides_results() {
                 true => format!("{kind} from round {from}"),

@@ -28,7 +28,7 @@ pub(super) fn day_table(competition: &Competition, evaluations: &[EvaluationView
         let (state, finished_at) = match &evaluation.status {
             EvaluationStatus::Queued => ("queued", None),
             EvaluationStatus::Running => ("running", None),
-            EvaluationStatus::Finalising => ("finalising", None),
+            EvaluationStatus::Scoring => ("finalising", None),
             EvaluationStatus::Finished { finished_at, .. } => ("finished", Some(finished_at)),
             EvaluationStatus::AgentFailed { finished_at, .. } => {
                 ("agent_failed", Some(finished_at))
@@ -36,7 +36,9 @@ pub(super) fn day_table(competition: &Competition, evaluations: &[EvaluationView
             EvaluationStatus::PlatformFailed { finished_at, .. } => {
                 ("platform_failed", Some(finished_at))
             }
-            EvaluationStatus::NotPlayed { finished_at, .. } => ("not_played", Some(finished_at)),
+            EvaluationStatus::DeadlineMissed { finished_at, .. } => {
+                ("not_played", Some(finished_at))
+            }
             EvaluationStatus::Cancelled { finished_at, .. } => ("cancelled", Some(finished_at)),
         };
         let (result, hash) = match &evaluation.status {
@@ -56,7 +58,7 @@ pub(super) fn day_table(competition: &Competition, evaluations: &[EvaluationView
                 evaluation
                     .voided
                     .as_ref()
-                    .map_or("", |ruling| ruling.reason.as_str()),
+                    .map_or("", |decision| decision.reason.as_str()),
             ),
             escape_formula(evaluation.extra_evaluation.as_deref().unwrap_or_default()),
             or_empty(finished_at),

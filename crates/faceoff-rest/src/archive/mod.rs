@@ -12,7 +12,7 @@ use faceoff_service::{
     problem::{Problem, ProblemKind},
     viewer::Viewer,
 };
-use faceoff_store::{ArtifactOwner, MissingSummaries, Snapshot};
+use faceoff_store::{ArtifactOwner, DatabaseSnapshot, MissingSummaries};
 use faceoff_types::Clock;
 use files::Files;
 use jiff::Timestamp;
@@ -170,7 +170,7 @@ async fn missing_summaries(app: &App) -> Result<MissingSummaries, Problem> {
 }
 
 /// An application state that shows the snapshot at its time, as a server with the imported archive does.
-fn snapshot_app(app: &App, snapshot: &Snapshot, made_at: Timestamp) -> App {
+fn snapshot_app(app: &App, snapshot: &DatabaseSnapshot, made_at: Timestamp) -> App {
     let config = HttpConfig {
         clock: Clock::new(move || made_at),
         ..app.config.clone()

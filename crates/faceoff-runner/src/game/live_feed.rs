@@ -2,7 +2,7 @@
 //! serve to a goal, a foul or another end.
 
 use super::report::{GameObserver, GameReport};
-use faceoff_airhockey::{GameStepRow, RallyEnding, RallyEntry, RallyRow, RallyStart};
+use faceoff_airhockey::{GameStepRow, RallyEnding, RallyReadiness, RallyRow, RallyStart};
 use faceoff_sim::{GameState, RallyEnd, table::frames::table_from_robot};
 use faceoff_types::{GameEvent, LiveEvent, LivePosition, Side};
 use std::time::{Duration, Instant};
@@ -75,8 +75,8 @@ impl GameObserver for LiveFeed<'_> {
         self.last_position = position(start.game_step, start.state);
         let restarted = Side::BOTH
             .into_iter()
-            .zip(start.entries)
-            .filter(|(_, entry)| start.rally > 0 && has_started(entry))
+            .zip(start.readiness)
+            .filter(|(_, readiness)| start.rally > 0 && has_started(readiness))
             .map(|(side, _)| GameEvent::Restarted { side });
         let rally_begun = GameEvent::RallyBegun {
             rally: start.rally,
@@ -124,13 +124,13 @@ impl GameObserver for LiveFeed<'_> {
 }
 
 /// Was the agent's process started for this rally?
-const fn has_started(entry: &RallyEntry) -> bool {
+const fn has_started(readiness: &RallyReadiness) -> bool {
     matches!(
-        entry,
-        RallyEntry::Ready {
+        readiness,
+        RallyReadiness::Ready {
             startup_s: Some(_),
             ..
-        } | RallyEntry::ResetFailed {
+        } | RallyReadiness::ResetFailed {
             startup_s: Some(_),
             ..
         }

@@ -82,11 +82,11 @@ fn start_rally<S: ControllingSink>(
     })?;
     wait_for_both(sides, after_answer)?;
     let [first, second] = sides;
-    let entries = [
-        first.rally_entry(first_start),
-        second.rally_entry(second_start),
+    let readiness = [
+        first.rally_readiness(first_start),
+        second.rally_readiness(second_start),
     ];
-    game.start_rally(entries)?;
+    game.start_rally(readiness)?;
     kill_faulty_agents(game, sides);
     Ok(())
 }

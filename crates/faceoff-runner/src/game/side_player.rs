@@ -9,7 +9,7 @@ use crate::{
     session::Session,
     wait_breakdown::WaitBreakdown,
 };
-use faceoff_airhockey::{RallyEntry, Response, SideFault};
+use faceoff_airhockey::{RallyReadiness, Response, SideFault};
 use faceoff_episode::AnswerTiming;
 use faceoff_sim::Interpolation;
 use faceoff_types::{AgentFault, AgentTask, Side, TimeLimits};
@@ -207,11 +207,11 @@ impl<'a> SidePlayer<'a> {
     }
 
     /// How this side got ready for the rally; called after the answer to its reset.
-    pub fn rally_entry(&mut self, start: StartResult) -> RallyEntry {
+    pub fn rally_readiness(&mut self, start: StartResult) -> RallyReadiness {
         let startup_s = match start {
             StartResult::Ready { startup_s } => startup_s,
             StartResult::Failed { startup_s, fault } => {
-                return RallyEntry::StartFailed { startup_s, fault };
+                return RallyReadiness::StartFailed { startup_s, fault };
             }
         };
         let interpolation = self
@@ -220,14 +220,14 @@ impl<'a> SidePlayer<'a> {
             .and_then(|session| Interpolation::from_code(session.layout().code()).ok())
             .expect("an agent that is ready runs, with a layout of the competition");
         match self.result.take().expect("the reset has a result") {
-            Ok(timing) => RallyEntry::Ready {
+            Ok(timing) => RallyReadiness::Ready {
                 startup_s,
                 interpolation,
                 reset_s: timing.computation_time_s,
             },
             Err(failure) => {
                 self.wait = failure.wait;
-                RallyEntry::ResetFailed {
+                RallyReadiness::ResetFailed {
                     startup_s,
                     interpolation,
                     reset_s: failure.timing.computation_time_s,

@@ -1,7 +1,7 @@
 //! Mean goal differences with bootstrap intervals over games or mirrored pairs (two games with the same seed and swapped
 //! sides).
 
-use crate::draws::Draws;
+use crate::random_numbers::RandomNumbers;
 use serde::Serialize;
 
 /// Minimum number of games or pairs for an interval: with fewer, a bootstrap interval is too narrow.
@@ -75,13 +75,13 @@ pub(super) fn bootstrap_ci95<const N: usize>(
     if groups.iter().map(Vec::len).sum::<usize>() < MIN_FOR_INTERVAL as usize {
         return None;
     }
-    let mut draws = Draws::new(key(groups).finalize_xof());
+    let mut random_numbers = RandomNumbers::new(key(groups).finalize_xof());
     let mut drawn = groups.to_vec();
     let mut values: Vec<f64> = (0..RESAMPLES)
         .filter_map(|_| {
             for (drawn, group) in drawn.iter_mut().zip(groups) {
                 let count = u32::try_from(group.len()).expect("a file of games is far shorter");
-                drawn.fill_with(|| group[draws.below(count)]);
+                drawn.fill_with(|| group[random_numbers.below(count)]);
             }
             statistic(&drawn)
         })

@@ -85,7 +85,7 @@ impl GameScore {
     /// The game as input of standings and ratings, without submission labels and pair number. A game that was forfeited
     /// before its first step has one window, in which nothing counts.
     #[must_use]
-    pub fn entry(&self, round: RoundNumber, [home, away]: [TeamName; 2]) -> GameEntry {
+    pub fn game_entry(&self, round: RoundNumber, [home, away]: [TeamName; 2]) -> GameEntry {
         let [first, second] = &self.sides;
         GameEntry {
             round: round.get(),
@@ -403,13 +403,13 @@ mod tests {
             (forfeit.clone(), side(9, 0, clean())),
         ] {
             let score = scored(end, [first, side(1, 0, clean())]);
-            let game = PlayedGame::try_from(score.entry(RoundNumber::FIRST, teams())).unwrap();
+            let game = PlayedGame::try_from(score.game_entry(RoundNumber::FIRST, teams())).unwrap();
             assert_eq!(game.result(), score.result());
             assert_eq!(game.score(), [score.sides[0].score, score.sides[1].score]);
         }
         let mut unplayed = scored(forfeit, [side(0, 0, Vec::new()), side(0, 0, Vec::new())]);
         (unplayed.steps, unplayed.windows) = (0, 0);
-        let game = PlayedGame::try_from(unplayed.entry(RoundNumber::FIRST, teams())).unwrap();
+        let game = PlayedGame::try_from(unplayed.game_entry(RoundNumber::FIRST, teams())).unwrap();
         assert_eq!((game.score(), game.winner()), ([0, 10], Some(Side::Away)));
     }
 }

@@ -7,7 +7,7 @@ use axum::{
     http::{HeaderName, HeaderValue, header},
     response::{IntoResponse, Response},
 };
-use faceoff_store::Ruling;
+use faceoff_store::DecisionRecord;
 use jiff::Timestamp;
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -121,7 +121,7 @@ impl Problem {
     }
 
     /// A file that was removed. `file` is its name in the message; `removal` says when it was removed, and by whom or why.
-    pub fn removed(file: &str, removal: &Ruling) -> Self {
+    pub fn removed(file: &str, removal: &DecisionRecord) -> Self {
         let removed_at = removal.at.strftime("%Y-%m-%d at %H:%M:%S UTC");
         let detail = format!("{file} was removed on {removed_at} {}", removal.reason);
         Self::new(ProblemKind::Removed, detail).with("removed_at", removal.at.to_string())

@@ -109,7 +109,7 @@ pub async fn leave_by_name(
     departure: &NewDeparture,
 ) -> Result<(), Problem> {
     let reason = checked_reason(&departure.reason)?;
-    if departure.from_round.is_some() && departure.r#as == DepartureKind::Withdrawn {
+    if departure.from_round.is_some() && departure.kind == DepartureKind::Withdrawn {
         return Err(Problem::invalid(
             "from_round",
             "expected none for a withdrawal, got one; leave it out: finished rounds of a team that withdraws count",
@@ -119,7 +119,7 @@ pub async fn leave_by_name(
     let team = entrants::find_by_names(app, "team", slice::from_ref(&departure.team)).await?[0];
     let planned = PlannedDeparture {
         team,
-        kind: departure.r#as,
+        kind: departure.kind,
         from_round: departure.from_round,
         reason: Some(reason),
     };

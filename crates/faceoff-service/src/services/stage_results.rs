@@ -77,7 +77,7 @@ pub async fn preview_sign_off(app: &AppState, id: StageId) -> Result<Preview, Pr
 
 /// Signs a stage's result off, if that is confirmed with the stage's name.
 #[boxed]
-pub async fn finalise_stage(
+pub async fn sign_off_stage(
     app: &AppState,
     actor: Actor,
     id: StageId,

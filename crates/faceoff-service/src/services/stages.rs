@@ -51,11 +51,14 @@ pub fn check_offered(app: &AppState, requested: Option<&Runtimes>) -> Result<(),
 
 /// Refuses magnitudes of perturbations with which this season cannot be played.
 #[boxed]
-pub async fn check_playable(app: &AppState, magnitudes: &Magnitudes) -> Result<(), Problem> {
+pub async fn check_season_magnitudes(
+    app: &AppState,
+    magnitudes: &Magnitudes,
+) -> Result<(), Problem> {
     let seed = app.store.season().await?.secret.model_mismatch();
     let simulator = Arc::clone(&app.config.simulator);
     let magnitudes = magnitudes.clone();
-    let check = move || simulator.check_playable(&magnitudes, seed);
+    let check = move || simulator.check_season_magnitudes(&magnitudes, seed);
     let checked = tokio::task::spawn_blocking(check)
         .await
         .map_err(Problem::internal)?;
@@ -88,7 +91,7 @@ pub async fn create_stage(app: &AppState, actor: Actor, new: NewStage) -> Result
         .and_then(|()| app.config.competition().check_rules(&mut rules))
         .map_err(|error| invalid_rules(&error))?;
     let retention = checked_retention(patch.retention)?.unwrap_or_default();
-    check_playable(app, &rules.variation.perturbations).await?;
+    check_season_magnitudes(app, &rules.variation.perturbations).await?;
     let new_stage = faceoff_store::NewStage {
         name: parse_name(&name)?,
         opens_at: patch.opens_at.unwrap_or(now),
@@ -130,7 +133,7 @@ pub async fn change_stage(
         .map_err(|error| invalid_rules(&error))?;
     let retention = checked_retention(change.retention)?;
     if rules.variation.perturbations != current_rules.variation.perturbations {
-        check_playable(app, &rules.variation.perturbations).await?;
+        check_season_magnitudes(app, &rules.variation.perturbations).await?;
     }
     let mut effects = Vec::new();
     if stage.phase(now) == StagePhase::Open {

@@ -106,7 +106,7 @@ pub async fn create_token(
     let owner = new_token_owner(caller, new.team)?;
     let name = text::single_line("name", &new.name, MAX_NAME_CHARS)?;
     let kind = match owner {
-        TokenOwner::Host => SecretKind::Admin,
+        TokenOwner::Host => SecretKind::Host,
         TokenOwner::Team(id) => {
             app.store.team(id).await?;
             SecretKind::Team
@@ -156,7 +156,7 @@ pub async fn rotate_token(
         ));
     }
     let kind = match token.owner {
-        TokenOwner::Host => SecretKind::Admin,
+        TokenOwner::Host => SecretKind::Host,
         TokenOwner::Team(_) => SecretKind::Team,
         TokenOwner::User(_) => SecretKind::User,
     };

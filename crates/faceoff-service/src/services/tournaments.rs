@@ -3,7 +3,7 @@
 use super::{
     decisions::{Preview, checked_reason},
     entrants,
-    stages::{check_offered, check_playable, parse_name},
+    stages::{check_offered, check_season_magnitudes, parse_name},
 };
 use crate::{app::AppState, boxed, problem::Problem, views::stage};
 use faceoff_api::{
@@ -223,7 +223,7 @@ async fn changed_rules(
         rules.ruleset = newest;
     }
     check_offered(app, rules.runtimes.as_ref())?;
-    check_playable(app, &rules.perturbations).await?;
+    check_season_magnitudes(app, &rules.perturbations).await?;
     Ok(rules)
 }
 

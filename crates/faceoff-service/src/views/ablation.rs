@@ -26,10 +26,10 @@ pub async fn newest(
 #[boxed]
 pub async fn build(app: &AppState, ablation: Ablation) -> Result<AblationView, Problem> {
     let status = match ablation.state {
-        AblationState::Open {
+        AblationState::Unfinished {
             progress,
             episodes_total,
-        } => AblationStatus::Open {
+        } => AblationStatus::Unfinished {
             progress: Progress {
                 episodes_done: progress.in_whole_shards(app.config.clock.now()),
                 episodes_total,

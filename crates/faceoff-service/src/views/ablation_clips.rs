@@ -106,7 +106,7 @@ impl AblationClips {
             };
             let perturbed = file.read(Pack::clip_index).await?.episodes;
             let pairs = perturbed.into_iter().filter_map(|perturbed| {
-                let ideal = ideal.line(perturbed.task, perturbed.episode)?.clone();
+                let ideal = ideal.summary(perturbed.task, perturbed.episode)?.clone();
                 let mut pair = DifferingEpisode { ideal, perturbed };
                 if !self.can_see_observations {
                     pair.ideal.make_public();

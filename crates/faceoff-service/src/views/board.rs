@@ -8,7 +8,7 @@ use crate::{
     boxed,
     problem::{Problem, ProblemKind},
     summaries::RunSummaries,
-    views::{board_rows, division, ruling, sign_off, stage, team, visibility::Visibility},
+    views::{board_rows, decision, division, sign_off, stage, team, visibility::Visibility},
 };
 use faceoff_api::{
     requests::{BoardBy, BoardQuery},
@@ -122,7 +122,7 @@ pub async fn query(
     )
     .await?;
     Ok(BoardView {
-        frozen: frozen.map(ruling::view),
+        frozen: frozen.map(decision::view),
         ..board
     })
 }
@@ -182,7 +182,7 @@ pub async fn build(
         day: scope.last_day,
         blind: stage.settings.blind,
         provisional: stage.sign_off.is_none(),
-        finalised: stage.sign_off.clone().map(sign_off::view),
+        sign_off: stage.sign_off.clone().map(sign_off::view),
         task: selection.task,
         division: selection.division,
         significance: SIGNIFICANCE,
@@ -339,7 +339,7 @@ fn row_view(ranked: RankedEntry<Row>, rank_group: u32, task: Option<Task>) -> Bo
 /// The row of a baseline; `row.rank` is the rank that it would have if it were ranked.
 fn baseline_row(row: BoardRow) -> BaselineRow {
     BaselineRow {
-        would_rank: row.rank,
+        hypothetical_rank: row.rank,
         baseline: true,
         tier: row.tier,
         tier_change_probability: row.tier_change_probability,

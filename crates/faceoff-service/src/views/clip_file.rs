@@ -8,8 +8,8 @@ use std::path::PathBuf;
 
 /// An episode, as far as the viewer may see it.
 pub struct Episode {
-    /// The outcome of the episode, as a line of the clip index.
-    pub line: EpisodeLine,
+    /// The summary of the episode, from the clip index.
+    pub summary: EpisodeLine,
     /// Whether the file also has the task's previous episode.
     pub has_previous: bool,
     /// Whether the file also has the task's next episode.
@@ -84,19 +84,19 @@ impl ClipFile {
                 let bytes = pack.clip(key)?;
                 bytes.map(|bytes| Clip::read(&bytes)).transpose()
             };
-            let line = index.line(task, episode);
-            let Some((line, motion)) = line.zip(clip(ClipKey::motion(task, episode))?) else {
+            let summary = index.summary(task, episode);
+            let Some((summary, motion)) = summary.zip(clip(ClipKey::motion(task, episode))?) else {
                 return Ok(None);
             };
             let exists = |episode: Option<u32>| {
-                episode.is_some_and(|episode| index.line(task, episode).is_some())
+                episode.is_some_and(|episode| index.summary(task, episode).is_some())
             };
-            let mut line = line.clone();
+            let mut summary = summary.clone();
             if !can_see_observations {
-                line.make_public();
+                summary.make_public();
             }
             Ok(Some(Episode {
-                line,
+                summary,
                 has_previous: exists(episode.checked_sub(1)),
                 has_next: exists(episode.checked_add(1)),
                 motion,

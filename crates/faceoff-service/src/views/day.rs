@@ -31,7 +31,7 @@ pub async fn build(app: &AppState, stage_day: StageDay) -> Result<DayView, Probl
     Ok(DayView {
         stage: stage_day.stage,
         day: stage_day.date,
-        created: evaluations,
+        evaluations,
         without_submission,
         excluded: excluded_teams,
     })

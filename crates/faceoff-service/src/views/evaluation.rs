@@ -4,7 +4,7 @@ use crate::{
     app::AppState,
     boxed,
     problem::Problem,
-    views::{queue, ruling, visibility::Visibility},
+    views::{decision, queue, visibility::Visibility},
 };
 use faceoff_api::{
     paths,
@@ -164,17 +164,17 @@ fn evaluation_view(
         EvaluationState::Running { progress, .. } => {
             visibility.episodes_done(progress).min(episodes_total)
         }
-        EvaluationState::Finalising | EvaluationState::Finished { .. } => episodes_total,
+        EvaluationState::Scoring | EvaluationState::Finished { .. } => episodes_total,
         EvaluationState::Queued
         | EvaluationState::AgentFailed { .. }
         | EvaluationState::PlatformFailed { .. }
-        | EvaluationState::NotPlayed { .. }
+        | EvaluationState::DeadlineMissed { .. }
         | EvaluationState::Cancelled { .. } => 0,
     };
     let status = match evaluation.state {
         EvaluationState::Queued => EvaluationStatus::Queued,
         EvaluationState::Running { .. } => EvaluationStatus::Running,
-        EvaluationState::Finalising => EvaluationStatus::Finalising,
+        EvaluationState::Scoring => EvaluationStatus::Scoring,
         EvaluationState::Finished {
             finished_at,
             result,
@@ -199,10 +199,10 @@ fn evaluation_view(
             finished_at,
             reason: printable(reason),
         },
-        EvaluationState::NotPlayed {
+        EvaluationState::DeadlineMissed {
             finished_at,
             reason,
-        } => EvaluationStatus::NotPlayed {
+        } => EvaluationStatus::DeadlineMissed {
             finished_at,
             reason,
         },
@@ -233,10 +233,10 @@ fn evaluation_view(
                 evaluation.extra_for.as_deref(),
             ),
         extra_evaluation: evaluation.extra_for,
-        voided: evaluation.voided.map(ruling::view),
+        voided: evaluation.voided.map(decision::view),
         blind: is_hidden,
         public: is_public,
-        dataset_removed: evaluation.dataset_removed.map(ruling::view),
+        dataset_removed: evaluation.dataset_removed.map(decision::view),
         profile: evaluation.plan.profile,
         tasks: evaluation.plan.tasks,
         episodes_per_task: evaluation.plan.episodes_per_task,

@@ -58,7 +58,12 @@ pub fn round_games(
     round: Option<RoundNumber>,
 ) -> Result<Vec<GameView>, Problem> {
     let is_selected = |game: &&Game| {
-        round.is_none() || game.purpose.schedule_entry().map(|entry| entry.round) == round
+        round.is_none()
+            || game
+                .purpose
+                .schedule_entry()
+                .map(|schedule_entry| schedule_entry.round)
+                == round
     };
     let games = state.games.iter().filter(is_selected);
     games.map(|game| view(state, viewer, game)).collect()
@@ -125,7 +130,7 @@ fn purpose(state: &TournamentState, game: &Game) -> Result<PurposeView, Problem>
             meeting,
             second_half,
         },
-        GamePurpose::Replay { replay, original } => PurposeView::Replay {
+        GamePurpose::ScheduleReplay { replay, original } => PurposeView::ScheduleReplay {
             replay,
             round: original.round,
             matchday: original.matchday,

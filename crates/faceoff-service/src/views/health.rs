@@ -4,7 +4,7 @@ use crate::{
     app::AppState,
     boxed,
     problem::{Problem, ProblemKind},
-    views::{ruling, workers},
+    views::{decision, workers},
 };
 use faceoff_api::views::health::HealthView;
 use faceoff_store::QueueHealth;
@@ -77,7 +77,7 @@ pub async fn check(app: &AppState) -> Result<HealthView, Problem> {
             running,
             waiting,
             paused: match health.queue {
-                QueueHealth::Paused { ruling, .. } => Some(ruling::view(ruling)),
+                QueueHealth::Paused { decision, .. } => Some(decision::view(decision)),
                 _ => None,
             },
         });

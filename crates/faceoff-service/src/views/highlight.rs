@@ -75,22 +75,23 @@ fn quickest_success(
     let mut tasks: Vec<_> = competition.tasks.iter().collect();
     tasks.sort_by_key(|info| Reverse(info.weight));
     let successes = |task| {
-        let lines = index.episodes.iter();
-        lines.filter(move |line| line.task == task && line.success && line.has_clips())
+        let summaries = index.episodes.iter();
+        summaries
+            .filter(move |summary| summary.task == task && summary.success && summary.has_clips())
     };
-    let quickest: Option<&EpisodeLine> = tasks
-        .iter()
-        .find_map(|info| successes(info.task).min_by_key(|line| (line.steps, line.episode)));
-    let Some(line) = quickest else {
+    let quickest: Option<&EpisodeLine> = tasks.iter().find_map(|info| {
+        successes(info.task).min_by_key(|summary| (summary.steps, summary.episode))
+    });
+    let Some(summary) = quickest else {
         return Ok(None);
     };
-    let Some(bytes) = pack.clip(ClipKey::motion(line.task, line.episode))? else {
+    let Some(bytes) = pack.clip(ClipKey::motion(summary.task, summary.episode))? else {
         return Ok(None);
     };
     Ok(Some(Highlight {
-        task: line.task,
-        episode: line.episode,
-        steps: line.steps,
+        task: summary.task,
+        episode: summary.episode,
+        steps: summary.steps,
         motion: Clip::read(&bytes)?,
     }))
 }

@@ -8,7 +8,7 @@ use crate::{
     views::{
         board,
         board_rows::{self, CountingRule},
-        division, ruling,
+        decision, division,
         visibility::Visibility,
     },
 };
@@ -95,7 +95,7 @@ pub async fn query(
         by: requested_result,
         task: query.task,
         division,
-        frozen: frozen.map(ruling::view),
+        frozen: frozen.map(decision::view),
         days,
         rows,
     })
@@ -148,7 +148,7 @@ fn rows(
                 )
             })
             .collect();
-        day_rows.sort_by_key(|row| (row.baseline, row.rank.or(row.would_rank)));
+        day_rows.sort_by_key(|row| (row.baseline, row.rank.or(row.hypothetical_rank)));
         rows.extend(day_rows);
     }
     Ok(rows)
@@ -164,7 +164,7 @@ fn row(
     record: &BoardRecord,
     task: Option<Task>,
     rank: Option<u32>,
-    would_rank: Option<u32>,
+    hypothetical_rank: Option<u32>,
 ) -> Option<HistoryRow> {
     let result = &record.result;
     let released = record.released_at.is_some();
@@ -180,7 +180,7 @@ fn row(
         division: record.team.profile.division.clone(),
         baseline: record.team.is_baseline,
         rank,
-        would_rank,
+        hypothetical_rank,
         evaluation: record.evaluation,
         finished_at: record.finished_at,
         released_at: record.released_at,

@@ -18,8 +18,8 @@ pub fn view(invitation: Invitation, now: Timestamp) -> InvitationView {
     let (state, accepted_by) = match invitation.state {
         InvitationState::Accepted { user, .. } => ("accepted", Some(user)),
         InvitationState::Revoked { .. } => ("revoked", None),
-        InvitationState::Open if invitation.expires_at <= now => ("expired", None),
-        InvitationState::Open => ("open", None),
+        InvitationState::Unused if invitation.expires_at <= now => ("expired", None),
+        InvitationState::Unused => ("open", None),
     };
     InvitationView {
         id: invitation.id,

@@ -22,7 +22,7 @@ pub async fn build(app: &AppState, team: Team) -> Result<MeView, Problem> {
         let has_no_result = matches!(
             evaluation.state,
             EvaluationState::PlatformFailed { .. }
-                | EvaluationState::NotPlayed { .. }
+                | EvaluationState::DeadlineMissed { .. }
                 | EvaluationState::Cancelled { .. }
         );
         !has_no_result && evaluation.voided.is_none()

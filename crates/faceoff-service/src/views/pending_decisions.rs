@@ -115,7 +115,7 @@ pub fn evaluations_to_repeat(evaluations: &[Evaluation]) -> impl Iterator<Item =
     evaluations.iter().filter(move |evaluation| {
         let has_no_result = matches!(
             evaluation.state,
-            EvaluationState::PlatformFailed { .. } | EvaluationState::NotPlayed { .. }
+            EvaluationState::PlatformFailed { .. } | EvaluationState::DeadlineMissed { .. }
         );
         has_no_result && evaluation.voided.is_none() && !replaced.contains(&evaluation.id)
     })

@@ -54,7 +54,7 @@ async fn evaluation_view(
     let status = match evaluation.state {
         EvaluationState::Queued => ProposedEvaluationStatus::Queued,
         EvaluationState::Running { .. } => ProposedEvaluationStatus::Running,
-        EvaluationState::Finalising => ProposedEvaluationStatus::Finalising,
+        EvaluationState::Scoring => ProposedEvaluationStatus::Scoring,
         EvaluationState::Finished {
             finished_at,
             result,
@@ -80,7 +80,7 @@ async fn evaluation_view(
             finished_at,
             reason: printable(reason),
         },
-        EvaluationState::NotPlayed { finished_at, .. }
+        EvaluationState::DeadlineMissed { finished_at, .. }
         | EvaluationState::Cancelled { finished_at, .. } => {
             ProposedEvaluationStatus::Cancelled { finished_at }
         }
@@ -219,7 +219,7 @@ fn changes(old: &BoardView, new: &BoardView) -> Vec<ChangeView> {
         ranked.or_else(|| {
             let row = board.baselines.iter().find(|row| row.team_id == team)?;
             Some(RankView {
-                rank: row.would_rank,
+                rank: row.hypothetical_rank,
                 tier: row.tier,
                 score: row.score,
                 penalty_points: row.penalty_points,

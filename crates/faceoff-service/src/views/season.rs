@@ -6,10 +6,10 @@ use crate::{
     boxed,
     problem::Problem,
     viewer::Viewer,
-    views::{archive, day, ruling, stage, visibility::Visibility},
+    views::{archive, day, decision, stage, visibility::Visibility},
 };
 use faceoff_api::views::{
-    ruling::RulingView,
+    decision::DecisionView,
     season::{SeasonDay, SeasonView},
 };
 use faceoff_types::{Seed, StageDay};
@@ -34,7 +34,7 @@ pub async fn build(app: &AppState, viewer: Viewer) -> Result<SeasonView, Problem
         ruleset: app.config.competition().ruleset().to_string(),
         created_at: season.created_at,
         closed_at: season.closed_at,
-        paused: season.paused.map(ruling::view),
+        paused: season.queue_pause.map(decision::view),
         archived: app.store.archived_season().map(archive::view),
         takes_registrations: season.registration_open,
         divisions: app.store.divisions().await?,
@@ -71,7 +71,7 @@ pub struct SeasonSummary {
     /// Hash of the season secret, in hexadecimal digits.
     pub commitment: String,
     /// If an organiser paused the queue: since when, and why.
-    pub paused: Option<RulingView>,
+    pub paused: Option<DecisionView>,
     /// Whether teams can register now.
     pub takes_registrations: bool,
 }
@@ -86,7 +86,7 @@ impl SeasonSummary {
             takes_registrations: season.registration_open && season.closed_at.is_none(),
             name: season.name,
             commitment: season.commitment,
-            paused: season.paused.map(ruling::view),
+            paused: season.queue_pause.map(decision::view),
         })
     }
 }

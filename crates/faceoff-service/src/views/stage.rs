@@ -6,7 +6,7 @@ use crate::{
     boxed,
     problem::Problem,
     viewer::Viewer,
-    views::{capacity, day, ruling, sign_off},
+    views::{capacity, day, decision, sign_off},
 };
 use faceoff_api::views::stage::{PhaseView, RevisionView, StageView};
 use faceoff_store::{Revision, Stage, StagePhase};
@@ -78,7 +78,7 @@ pub async fn build(app: &AppState, stage: Stage) -> Result<StageView, Problem> {
     Ok(StageView {
         retention: app.store.stage_retention(stage.id).await?,
         next_cutoff: day::next_cutoff(app, &stage).await?,
-        frozen: app.store.board_freeze(stage.id).await?.map(ruling::view),
+        frozen: app.store.board_freeze(stage.id).await?.map(decision::view),
         phase: phase(stage.phase(app.config.clock.now())),
         id: stage.id,
         name: stage.name,
@@ -87,7 +87,7 @@ pub async fn build(app: &AppState, stage: Stage) -> Result<StageView, Problem> {
         zone: stage.zone,
         names_seeds: stage.names_seeds,
         configured: stage.configured,
-        finalised: stage.sign_off.map(sign_off::view),
+        sign_off: stage.sign_off.map(sign_off::view),
         settings: stage.settings,
         rules: revision(stage.rules),
         revisions: revisions.into_iter().map(revision).collect(),

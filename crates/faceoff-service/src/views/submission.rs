@@ -5,7 +5,7 @@ use crate::{
     app::AppState,
     boxed,
     problem::Problem,
-    views::{exclusions, queue, ruling},
+    views::{decision, exclusions, queue},
 };
 use faceoff_api::views::{
     printable,
@@ -89,7 +89,7 @@ pub fn view(
             log: log.map(printable),
         },
         // The reason may contain a file name from the bundle.
-        SubmissionState::ValidationError { reason } => SubmissionStatus::ValidationError {
+        SubmissionState::PlatformFailed { reason } => SubmissionStatus::PlatformFailed {
             reason: printable(reason),
         },
     };
@@ -121,10 +121,10 @@ pub fn view(
         label: submission.label.map(printable),
         note: submission.note.map(printable),
         same_as: submission.duplicate_of,
-        bundle_removed: submission.bundle_removed.map(ruling::view),
-        deleted: submission.deleted.map(|deletion| DeletionView {
-            at: deletion.deleted_at,
-            by: deletion.actor.to_string(),
+        bundle_removed: submission.bundle_removed.map(decision::view),
+        deleted: submission.deletion_request.map(|request| DeletionView {
+            at: request.requested_at,
+            by: request.actor.to_string(),
         }),
         queue: None,
         next,

@@ -1,6 +1,6 @@
 //! Teams: name, profile and state.
 
-use crate::{app::AppState, boxed, problem::Problem, views::ruling};
+use crate::{app::AppState, boxed, problem::Problem, views::decision};
 use faceoff_api::views::team::TeamView;
 use faceoff_store::Team;
 use faceoff_types::TeamId;
@@ -11,7 +11,7 @@ pub fn view(team: Team) -> TeamView {
         id: team.id,
         name: team.name,
         created_at: team.created_at,
-        disqualified: team.disqualified.map(ruling::view),
+        disqualified: team.disqualified.map(decision::view),
         affiliation: team.profile.affiliation,
         link: team.profile.link,
         division: team.profile.division,

@@ -5,7 +5,7 @@ use crate::{
     app::AppState,
     boxed,
     problem::Problem,
-    views::{ruling, tournament_state::TournamentState},
+    views::{decision, tournament_state::TournamentState},
 };
 use faceoff_api::views::{
     printable,
@@ -68,7 +68,7 @@ fn build_head(state: &TournamentState, tables: &[Table]) -> TournamentHead {
         phase,
         created_at: tournament.created_at,
         stage: tournament.stage,
-        paused: tournament.paused.clone().map(ruling::view),
+        paused: tournament.paused.clone().map(decision::view),
         closed_at: tournament.closed_at,
         champion: champion(state, tables),
         next: next_text(state, phase),
@@ -126,7 +126,7 @@ pub fn entrant(entrant: Entrant) -> EntrantView {
 
 pub fn departure(departure: Departure) -> DepartureView {
     DepartureView {
-        r#as: departure.kind,
+        kind: departure.kind,
         from_round: departure.from_round,
         at: departure.at,
         reason: printable(departure.reason),
@@ -192,7 +192,9 @@ fn games_in_round(
         .games
         .iter()
         .filter_map(move |game| match game.purpose {
-            GamePurpose::Round(entry) if entry.round == number => Some((game, entry.matchday)),
+            GamePurpose::Round(schedule_entry) if schedule_entry.round == number => {
+                Some((game, schedule_entry.matchday))
+            }
             _ => None,
         })
 }

@@ -120,20 +120,20 @@ impl TournamentState {
         let schedule_entry = game.purpose.schedule_entry();
         let round =
             schedule_entry.map_or(RoundNumber::FIRST, |schedule_entry| schedule_entry.round);
-        let mut entry = score.entry(round, [self.name(home)?, self.name(away)?]);
+        let mut game_entry = score.game_entry(round, [self.name(home)?, self.name(away)?]);
         let labels = game.submissions.map(|id| id.to_string().parse());
         let [home_label, away_label] = labels;
-        entry.submissions = Some([
+        game_entry.submissions = Some([
             home_label.map_err(|error| damaged(&error))?,
             away_label.map_err(|error| damaged(&error))?,
         ]);
         // The two games of a mirrored pairing, with exchanged sides, have the same number.
-        entry.pair = schedule_entry
+        game_entry.pair = schedule_entry
             .filter(|_| self.tournament.rules.mirrored)
             .map(|schedule_entry| {
                 schedule_entry.round.get() * MAX_PAIRINGS_PER_ROUND + schedule_entry.pairing
             });
-        let played = PlayedGame::try_from(entry).map_err(|error| damaged(&error))?;
+        let played = PlayedGame::try_from(game_entry).map_err(|error| damaged(&error))?;
         Ok(Some((score, played)))
     }
 
@@ -165,7 +165,7 @@ impl TournamentState {
     /// Whether the game has no result and can still get one that counts.
     pub(crate) fn needs_result(&self, game: &Game) -> bool {
         let round = match game.purpose {
-            GamePurpose::Round(entry) => Some(entry.round),
+            GamePurpose::Round(schedule_entry) => Some(schedule_entry.round),
             _ => None,
         };
         // A team that withdraws may play the round under way to its end.

@@ -13,7 +13,7 @@ use crate::{
     viewer::Viewer,
 };
 use faceoff_store::{
-    Evaluation, EvaluationState, Game, GamePurpose, Ruling, RunProgress, Stage, StagePhase,
+    DecisionRecord, Evaluation, EvaluationState, Game, GamePurpose, RunProgress, Stage, StagePhase,
     StoreError, Tournament, TournamentRound,
 };
 use faceoff_types::{Publication, Side, StageId};
@@ -38,12 +38,12 @@ struct StageRestrictions {
     publishes: Publication,
     has_closed: bool,
     /// The freeze of the boards, if they are frozen.
-    frozen: Option<Ruling>,
+    frozen: Option<DecisionRecord>,
 }
 
 impl StageRestrictions {
     /// The freeze that hides a score which was computed at this time, if there is one.
-    fn hiding_freeze(&self, scored_at: Timestamp) -> Option<&Ruling> {
+    fn hiding_freeze(&self, scored_at: Timestamp) -> Option<&DecisionRecord> {
         self.frozen.as_ref().filter(|frozen| scored_at > frozen.at)
     }
 }
@@ -62,7 +62,7 @@ impl Visibility {
     pub async fn load(app: &AppState, viewer: Viewer) -> Result<Self, Problem> {
         let now = app.config.clock.now();
         let season_has_closed = app.store.season().await?.closed_at.is_some();
-        let mut frozen: BTreeMap<StageId, Ruling> =
+        let mut frozen: BTreeMap<StageId, DecisionRecord> =
             app.store.frozen_boards().await?.into_iter().collect();
         let restrictions = |stage: Stage| {
             let restrictions = StageRestrictions {
@@ -131,13 +131,13 @@ impl Visibility {
     }
 
     /// Since when a stage's boards are frozen, and why; `None` if they are not.
-    pub fn frozen(&self, stage: StageId) -> Option<&Ruling> {
+    pub fn frozen(&self, stage: StageId) -> Option<&DecisionRecord> {
         self.stages.get(&stage)?.frozen.as_ref()
     }
 
     /// The freeze that hides a score which was computed at this time from the viewer, on boards, pages and in comparisons. `None` if
     /// the score is visible; it always is for organisers.
-    pub fn hiding_freeze(&self, stage: StageId, scored_at: Timestamp) -> Option<&Ruling> {
+    pub fn hiding_freeze(&self, stage: StageId, scored_at: Timestamp) -> Option<&DecisionRecord> {
         if self.viewer == Viewer::Organiser {
             return None;
         }
@@ -243,7 +243,7 @@ impl<'a> GameVisibility<'a> {
     /// Whether the viewer may see a game and its result. Test and friendly games are visible only to their two teams.
     pub fn is_visible(self, game: &Game) -> bool {
         match game.purpose {
-            GamePurpose::Round(_) | GamePurpose::Replay { .. } => true,
+            GamePurpose::Round(_) | GamePurpose::ScheduleReplay { .. } => true,
             GamePurpose::Test { .. } | GamePurpose::Friendly { .. } => {
                 Side::BOTH.iter().any(|side| self.is_own(game, *side))
             }

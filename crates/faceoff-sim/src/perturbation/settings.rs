@@ -4,7 +4,8 @@
 use serde::{Deserialize, Serialize};
 
 /// Magnitudes of all factors; the defaults are the ruleset's. The profile decides which factors are active. Their valid ranges are those of
-/// the competition (`faceoff_airhockey::magnitudes`), which are checked before.
+/// the competition (`faceoff_airhockey::magnitudes`), which are checked before. The platform carries the same values by group and name, as
+/// `faceoff_types::Magnitudes`; requests and files call them `perturbations`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PerturbationSettings {

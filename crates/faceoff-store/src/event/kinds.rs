@@ -1,4 +1,4 @@
-//! The kind of an event: the name of its variant in snake case, as it is stored.
+//! The kind of an event: the name under which its variant is stored.
 
 use super::Event;
 

@@ -26,7 +26,7 @@ impl Event {
             | Self::EvaluationAgentFailed
             | Self::EvaluationPlatformFailed { .. }
             | Self::EvaluationCancelled { .. }
-            | Self::EvaluationNotPlayed { .. }
+            | Self::EvaluationDeadlineMissed { .. }
             | Self::EvaluationVoided { .. }
             | Self::EvaluationPublished
             | Self::ExtraTurnGiven { .. }
@@ -91,7 +91,7 @@ impl Event {
             | Self::ArchiveRemoved { .. }
             | Self::EvaluationQueued { .. }
             | Self::EvaluationBegun
-            | Self::EvaluationFinalising
+            | Self::EvaluationScoringStarted
             | Self::EvaluationApplied { .. }
             | Self::AblationOrdered { .. }
             | Self::AblationFinished
@@ -118,7 +118,7 @@ impl Event {
             | Self::WebhookRotated { .. }
             | Self::WebhookRemoved { .. }
             | Self::WebhookDied { .. }
-            | Self::UnitGivenBack { .. } => false,
+            | Self::JobReturned { .. } => false,
         }
     }
 }

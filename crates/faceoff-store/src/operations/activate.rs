@@ -25,7 +25,7 @@ fn check_valid(submission: &Submission) -> Result<()> {
         SubmissionState::Invalid { reason } => {
             format!("the submission is invalid ({reason}): upload a corrected one")
         }
-        SubmissionState::ValidationError { .. } => {
+        SubmissionState::PlatformFailed { .. } => {
             "the submission could not be checked because of a platform fault: upload it again"
                 .into()
         }

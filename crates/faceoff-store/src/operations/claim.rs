@@ -146,7 +146,7 @@ async fn describe_job(tx: &mut Tx, leased: &LeasedJob, worker: &str) -> Result<O
             })
         }
         Purpose::Shard { run: id, shard } => {
-            let owner = runs::owner(tx, id).await?;
+            let owner = runs::find_owner(tx, id).await?;
             let (run, seeds) = read_run(tx, id).await?;
             let submission = single_contestant(tx, id).await?;
             completion::record_run_start(tx, id, owner).await?;

@@ -90,7 +90,7 @@ async fn store_shard(tx: &mut Tx, id: RunId, shard: &Shard, commit: &ShardCommit
     commit.check(shard, run.keeps_recordings)?;
     let now = tx.now;
     shards::commit(tx, shard.id, commit, now).await?;
-    let owner = runs::owner(tx, id).await?;
+    let owner = runs::find_owner(tx, id).await?;
     tx.record(
         owner.subject(),
         Event::ShardCommitted {

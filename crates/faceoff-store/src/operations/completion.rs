@@ -54,7 +54,7 @@ pub(crate) async fn end_run(
         (RunOwner::Evaluation { id, proposal }, RunEnd::Completed) => {
             queue_scoring(tx, id).await?;
             if proposal.is_none() {
-                tx.record(Subject::Evaluation(id), Event::EvaluationFinalising);
+                tx.record(Subject::Evaluation(id), Event::EvaluationScoringStarted);
             }
             Ok(())
         }
@@ -80,7 +80,8 @@ pub(crate) async fn end_run(
 }
 
 async fn queue_scoring(tx: &mut Tx, id: EvaluationId) -> Result<()> {
-    let account = queue::account(tx, purpose::SCORING.lane, purpose::PLATFORM_ACCOUNT).await?;
+    let account =
+        queue::open_account(tx, purpose::SCORING.lane, purpose::PLATFORM_ACCOUNT_HOLDER).await?;
     let job = queue::insert(tx, purpose::SCORING, account).await?;
     scorings::insert(tx, id, job).await
 }
@@ -109,7 +110,7 @@ pub(crate) async fn fail_evaluation(
         Failure::Cancelled(reason) => Event::EvaluationCancelled {
             reason: reason.to_owned(),
         },
-        Failure::NotPlayed(reason) => Event::EvaluationNotPlayed {
+        Failure::DeadlineMissed(reason) => Event::EvaluationDeadlineMissed {
             reason: reason.to_owned(),
         },
     };

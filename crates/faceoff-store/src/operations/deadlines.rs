@@ -59,12 +59,17 @@ async fn end_day(tx: &mut Tx, stage_day: StageDay) -> Result<u32> {
         local_deadline.strftime("%Y-%m-%d at %H:%M:%S %Z")
     );
     let unfinished = counting_evaluations::incomplete_of_day(tx, stage_day).await?;
-    let not_played = u32::try_from(unfinished.len()).unwrap_or(u32::MAX);
-    tx.record(Subject::Day(stage_day), Event::DayOverdue { not_played });
+    let unfinished_count = u32::try_from(unfinished.len()).unwrap_or(u32::MAX);
+    tx.record(
+        Subject::Day(stage_day),
+        Event::DayOverdue {
+            not_played: unfinished_count,
+        },
+    );
     for evaluation in unfinished {
-        completion::fail_evaluation(tx, evaluation, Failure::NotPlayed(&reason)).await?;
+        completion::fail_evaluation(tx, evaluation, Failure::DeadlineMissed(&reason)).await?;
     }
-    Ok(not_played)
+    Ok(unfinished_count)
 }
 
 impl Store {

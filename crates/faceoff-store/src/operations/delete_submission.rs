@@ -19,10 +19,10 @@ use jiff::Timestamp;
 async fn check_no_evidence(tx: &mut Tx, team: TeamId) -> Result<()> {
     let reason = match teams::evidence(tx, team).await? {
         None => return Ok(()),
-        Some(Evidence::Disqualified(ruling)) => format!(
+        Some(Evidence::Disqualified(decision)) => format!(
             "the team was disqualified on {} ({}); its submissions and results are kept as evidence while it is",
-            ruling.at.strftime("%Y-%m-%d at %H:%M UTC"),
-            ruling.reason
+            decision.at.strftime("%Y-%m-%d at %H:%M UTC"),
+            decision.reason
         ),
         Some(Evidence::Retired(at)) => format!(
             "an organiser withdrew the team from the season on {}; its submissions and results are kept for the \
@@ -35,11 +35,11 @@ async fn check_no_evidence(tx: &mut Tx, team: TeamId) -> Result<()> {
 
 /// Refuses to remove a bundle that is still needed.
 async fn check_not_needed(tx: &mut Tx, submission: &Submission) -> Result<()> {
-    if let Some(deleted) = &submission.deleted {
+    if let Some(request) = &submission.deletion_request {
         return StoreError::conflict(format!(
             "it was deleted on {} by {}",
-            deleted.deleted_at.strftime("%Y-%m-%d at %H:%M UTC"),
-            deleted.actor
+            request.requested_at.strftime("%Y-%m-%d at %H:%M UTC"),
+            request.actor
         ));
     }
     if let Some(removed) = &submission.bundle_removed {
@@ -56,7 +56,7 @@ async fn check_not_needed(tx: &mut Tx, submission: &Submission) -> Result<()> {
                 "its validation run is queued or running: wait for its result",
             );
         }
-        SubmissionState::Invalid { .. } | SubmissionState::ValidationError { .. } => {
+        SubmissionState::Invalid { .. } | SubmissionState::PlatformFailed { .. } => {
             return StoreError::conflict(
                 "it failed its validation run, so the server removes its bundle automatically: there is nothing to delete",
             );

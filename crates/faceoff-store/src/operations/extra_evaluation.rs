@@ -7,7 +7,7 @@ use crate::{
     event::{Actor, Event, Subject},
     operations::{
         new_evaluation::{DaySetup, NewEvaluation, queue_evaluation},
-        rulings::void,
+        organiser_decisions::void,
         start_day::check_open,
     },
     queries,

@@ -5,7 +5,7 @@ use crate::{
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     store::Store,
-    tables::{freezes, rulings::Ruling, stages},
+    tables::{decision_records::DecisionRecord, freezes, stages},
 };
 use faceoff_types::StageId;
 use jiff::Timestamp;
@@ -29,12 +29,12 @@ impl Store {
                     frozen.at
                 ));
             }
-            let ruling = Ruling {
+            let decision = DecisionRecord {
                 at: now,
                 reason: reason.to_owned(),
             };
-            freezes::insert(tx, stage, &ruling).await?;
-            let reason = ruling.reason;
+            freezes::insert(tx, stage, &decision).await?;
+            let reason = decision.reason;
             tx.record(Subject::Stage(stage), Event::BoardsFrozen { reason });
             Ok(())
         })
@@ -63,13 +63,13 @@ impl Store {
 
     /// All stages with frozen boards, with time and reason.
     #[boxed]
-    pub async fn frozen_boards(&self) -> Result<Vec<(StageId, Ruling)>> {
+    pub async fn frozen_boards(&self) -> Result<Vec<(StageId, DecisionRecord)>> {
         freezes::all(&mut *self.database.read.acquire().await?).await
     }
 
     /// Time and reason of a stage's board freeze; `None` if its boards are not frozen.
     #[boxed]
-    pub async fn board_freeze(&self, stage: StageId) -> Result<Option<Ruling>> {
+    pub async fn board_freeze(&self, stage: StageId) -> Result<Option<DecisionRecord>> {
         freezes::find(&mut *self.database.read.acquire().await?, stage).await
     }
 }

@@ -75,11 +75,11 @@ pub struct JoinOutcome {
 #[derive(Debug, Clone, PartialEq)]
 pub enum CodeStatus {
     /// An invitation that can be accepted, with the team's name if it is for a member.
-    Open(Invitation, Option<TeamName>),
+    Invitation(Invitation, Option<TeamName>),
     /// The organisers have not decided on the registration yet.
-    Pending(Registration),
+    PendingRegistration(Registration),
     /// The organisers have refused the registration.
-    Refused(Registration),
+    RefusedRegistration(Registration),
 }
 
 fn invalid_invitation<T>(reason: impl Into<String>) -> Result<T> {
@@ -97,11 +97,11 @@ fn check_open(invitation: &Invitation, now: Timestamp) -> Result<()> {
             "the invitation was revoked on {}; ask for another one",
             format_time(revoked_at)
         )),
-        InvitationState::Open if invitation.expires_at <= now => invalid_invitation(format!(
+        InvitationState::Unused if invitation.expires_at <= now => invalid_invitation(format!(
             "the invitation expired on {}; ask for another one",
             format_time(invitation.expires_at)
         )),
-        InvitationState::Open => Ok(()),
+        InvitationState::Unused => Ok(()),
     }
 }
 
@@ -116,7 +116,7 @@ pub(super) async fn invite(tx: &mut Tx, new: NewInvitation) -> Result<Invitation
         creator,
         created_at: now,
         expires_at: new.expires_at,
-        state: InvitationState::Open,
+        state: InvitationState::Unused,
     };
     invitations::insert(tx, &invitation, new.code_hash).await?;
     let (role, subject) = match invitation.role {
@@ -222,14 +222,14 @@ async fn restore_access(
 async fn join(tx: &mut Tx, mut request: JoinRequest) -> Result<JoinOutcome> {
     let now = tx.now;
     let invitation = match code_status(tx, request.code_hash, now).await? {
-        CodeStatus::Open(invitation, _) => invitation,
-        CodeStatus::Pending(registration) => {
+        CodeStatus::Invitation(invitation, _) => invitation,
+        CodeStatus::PendingRegistration(registration) => {
             return invalid_invitation(format!(
                 "the registration of “{}” is pending; the same link is valid once the organisers have approved it",
                 registration.team_name
             ));
         }
-        CodeStatus::Refused(registration) => {
+        CodeStatus::RefusedRegistration(registration) => {
             let RegistrationState::Refused { reason, .. } = registration.state else {
                 return invalid_invitation("the registration was refused");
             };
@@ -302,13 +302,13 @@ async fn code_status(
             InvitationRole::Member(team) => Some(teams::find(connection, team).await?.name),
             _ => None,
         };
-        return Ok(CodeStatus::Open(invitation, team));
+        return Ok(CodeStatus::Invitation(invitation, team));
     }
     match registrations::by_code(connection, hash).await? {
         Some(registration) => Ok(match registration.state {
-            RegistrationState::Refused { .. } => CodeStatus::Refused(registration),
+            RegistrationState::Refused { .. } => CodeStatus::RefusedRegistration(registration),
             RegistrationState::Pending | RegistrationState::Approved { .. } => {
-                CodeStatus::Pending(registration)
+                CodeStatus::PendingRegistration(registration)
             }
         }),
         None => invalid_invitation(
@@ -381,7 +381,7 @@ impl Store {
                     );
                 }
                 InvitationState::Revoked { .. } => {}
-                InvitationState::Open => {
+                InvitationState::Unused => {
                     return ended_credentials::revoke_invitation(tx, invitation).await;
                 }
             }

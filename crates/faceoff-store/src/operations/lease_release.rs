@@ -35,15 +35,15 @@ pub(crate) async fn event_subject(
     Ok(match purpose {
         Purpose::Validation(id) => Subject::Submission(*id),
         Purpose::Game(id) => Subject::Game(*id),
-        Purpose::Shard { run, .. } => runs::owner(connection, *run).await?.subject(),
+        Purpose::Shard { run, .. } => runs::find_owner(connection, *run).await?.subject(),
         Purpose::Scoring(evaluation) => evaluation.owner().subject(),
     })
 }
 
 /// Drops a job after platform faults, and ends the submission, run or game that it belongs to.
-pub(crate) async fn give_up(tx: &mut Tx, job: Uuid, label: &str, reason: &str) -> Result<()> {
+pub(crate) async fn give_up(tx: &mut Tx, job: Uuid, stored_kind: &str, reason: &str) -> Result<()> {
     queue::drop_jobs(tx, &[job]).await?;
-    match purpose::of_job(tx, job, label).await {
+    match purpose::of_job(tx, job, stored_kind).await {
         Ok(Purpose::Validation(id)) => {
             submissions::set_validation_error(tx, id, reason).await?;
             let reason = reason.to_owned();
@@ -55,7 +55,7 @@ pub(crate) async fn give_up(tx: &mut Tx, job: Uuid, label: &str, reason: &str) -
         }
         Ok(Purpose::Game(id)) => game_lifecycle::give_up(tx, id, reason).await,
         Ok(Purpose::Shard { run, .. }) => {
-            let owner = runs::owner(tx, run).await?;
+            let owner = runs::find_owner(tx, run).await?;
             completion::end_run(tx, run, owner, RunEnd::PlatformFailed(reason)).await
         }
         Ok(Purpose::Scoring(evaluation)) => {
@@ -100,7 +100,7 @@ impl Store {
     /// [`MAX_ATTEMPTS`] failures an evaluation ends as
     /// [`PlatformFailed`](crate::EvaluationState::PlatformFailed) and is rerun a limited number of times
     /// ([`RERUN_PAUSES_S`](crate::RERUN_PAUSES_S)). A validation run ends as
-    /// [`ValidationError`](crate::SubmissionState::ValidationError), an ablation ends without a result. For a lost lease
+    /// [`PlatformFailed`](crate::SubmissionState::PlatformFailed), an ablation ends without a result. For a lost lease
     /// nothing is recorded.
     #[boxed]
     pub async fn release_failed(
@@ -116,8 +116,8 @@ impl Store {
             };
             let purpose = purpose::of_job(tx, claim.job, &kind).await?;
             let failures = queue::requeue_failed(tx, claim, now).await?;
-            let event = Event::UnitGivenBack {
-                unit: claim.job,
+            let event = Event::JobReturned {
+                job: claim.job,
                 failures,
                 reason: reason.to_owned(),
             };

@@ -6,7 +6,7 @@ use crate::{
     event::{Actor, Event, Subject},
     queue,
     store::Store,
-    tables::{rulings::Ruling, season},
+    tables::{decision_records::DecisionRecord, season},
 };
 use jiff::Timestamp;
 
@@ -19,12 +19,12 @@ impl Store {
             if season::is_paused(tx).await? {
                 return StoreError::conflict("the queue is paused already");
             }
-            let ruling = Ruling {
+            let decision = DecisionRecord {
                 at: now,
                 reason: reason.to_owned(),
             };
-            season::set_paused(tx, Some(&ruling)).await?;
-            let reason = ruling.reason;
+            season::set_paused(tx, Some(&decision)).await?;
+            let reason = decision.reason;
             tx.record(Subject::Season, Event::QueuePaused { reason });
             Ok(())
         })

@@ -5,7 +5,7 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::{completion, purpose, rulings::void, runs},
+    operations::{completion, organiser_decisions::void, purpose, runs},
     queries,
     queue::NewJob,
     store::Store,

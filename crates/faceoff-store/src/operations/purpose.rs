@@ -15,7 +15,7 @@ use faceoff_types::{GameId, RunId, SubmissionId};
 use sqlx::SqliteConnection;
 use uuid::Uuid;
 
-/// Kind of a job. The queue stores its label, which may be an earlier version's name of the kind.
+/// Kind of a job. The queue stores its name, which may be that of an earlier version.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum JobKind {
     Validation,
@@ -27,7 +27,7 @@ enum JobKind {
 impl JobKind {
     const ALL: [Self; 4] = [Self::Validation, Self::Scoring, Self::Shard, Self::Game];
 
-    const fn label(self) -> &'static str {
+    const fn stored_name(self) -> &'static str {
         match self {
             Self::Validation => "smoke",
             Self::Scoring => "finalise",
@@ -38,7 +38,7 @@ impl JobKind {
 
     const fn in_lane(self, lane: Lane) -> NewJob {
         NewJob {
-            kind: self.label(),
+            kind: self.stored_name(),
             lane,
             batch: 0,
             delay_s: 0,
@@ -64,7 +64,7 @@ pub(crate) const SHARD: NewJob = JobKind::Shard.in_lane(lane("shard", 1, 1));
 pub(crate) const ABLATION_SHARD: NewJob = JobKind::Shard.in_lane(lane("ablation", 2, 0));
 pub(crate) const ROUND_GAME: NewJob = JobKind::Game.in_lane(lane("game", 1, 2));
 pub(crate) const TEST_OR_FRIENDLY_GAME: NewJob = JobKind::Game.in_lane(lane("free_game", 2, 2));
-pub(crate) const REPLAY_GAME: NewJob = JobKind::Game.in_lane(lane("replay", 2, 3));
+pub(crate) const SCHEDULE_REPLAY_GAME: NewJob = JobKind::Game.in_lane(lane("replay", 2, 3));
 pub(crate) const PROPOSAL_SHARD: NewJob = JobKind::Shard.in_lane(lane("proposal", 2, 1));
 
 /// Kinds of jobs that a worker claims.
@@ -91,7 +91,7 @@ impl JobFilter {
 }
 
 /// Owner of the account of scoring jobs: they belong to no team, and run in the order in which they were queued.
-pub(crate) const PLATFORM_ACCOUNT: &str = "";
+pub(crate) const PLATFORM_ACCOUNT_HOLDER: &str = "";
 
 /// The submission, game, shard or evaluation that a job is for.
 #[derive(Debug)]
@@ -102,13 +102,16 @@ pub(crate) enum Purpose {
     Scoring(EvaluationRun),
 }
 
-/// Purpose of a job, from its label and the row that refers to it.
+/// Purpose of a job, from its stored kind and the row that refers to it.
 pub(crate) async fn of_job(
     connection: &mut SqliteConnection,
     job: Uuid,
-    label: &str,
+    stored_kind: &str,
 ) -> Result<Purpose> {
-    let purpose = match JobKind::ALL.into_iter().find(|kind| kind.label() == label) {
+    let purpose = match JobKind::ALL
+        .into_iter()
+        .find(|kind| kind.stored_name() == stored_kind)
+    {
         Some(JobKind::Validation) => validation_runs::of_job(connection, job)
             .await?
             .map(Purpose::Validation),
@@ -123,7 +126,7 @@ pub(crate) async fn of_job(
     };
     purpose.ok_or_else(|| {
         StoreError::Damaged(format!(
-            "job {job}: it is labelled {label:?}, but no row of that kind refers to it"
+            "job {job}: it is labelled {stored_kind:?}, but no row of that kind refers to it"
         ))
     })
 }
@@ -142,7 +145,7 @@ mod tests {
             PROPOSAL_SHARD,
             ROUND_GAME,
             TEST_OR_FRIENDLY_GAME,
-            REPLAY_GAME,
+            SCHEDULE_REPLAY_GAME,
         ];
         let lanes = |filter: JobFilter| {
             serde_json::from_str::<Vec<String>>(filter.lanes()).expect("the lanes are JSON")

@@ -77,7 +77,7 @@ impl Store {
                 evaluation.state,
                 EvaluationState::PlatformFailed { .. }
                     | EvaluationState::Cancelled { .. }
-                    | EvaluationState::NotPlayed { .. }
+                    | EvaluationState::DeadlineMissed { .. }
             );
             if !ended_without_result && evaluation.voided.is_none() {
                 return StoreError::conflict(

@@ -57,14 +57,14 @@ pub(crate) async fn subjects(
     connection: &mut SqliteConnection,
     run: RunId,
 ) -> Result<Vec<Subject>> {
-    let mut subjects = vec![owner(connection, run).await?.subject()];
+    let mut subjects = vec![find_owner(connection, run).await?.subject()];
     let proposal = evaluation_runs::proposal_of_run(connection, run).await?;
     subjects.extend(proposal.map(Subject::Proposal));
     subjects.dedup();
     Ok(subjects)
 }
 
-pub(crate) async fn owner(connection: &mut SqliteConnection, run: RunId) -> Result<RunOwner> {
+pub(crate) async fn find_owner(connection: &mut SqliteConnection, run: RunId) -> Result<RunOwner> {
     if let Some(evaluation) = evaluation_runs::of_run(connection, run).await? {
         return Ok(evaluation.owner());
     }
@@ -87,7 +87,7 @@ pub(crate) async fn queue_run(
         bundles::check_available(tx, *contestant).await?;
     }
     runs::insert(tx, run, contestants).await?;
-    let account = queue::account(tx, job.lane, &team.to_string()).await?;
+    let account = queue::open_account(tx, job.lane, &team.to_string()).await?;
     let mut parts = Vec::new();
     for task in run.plan.tasks.iter().copied() {
         let mut first_episode = 0;

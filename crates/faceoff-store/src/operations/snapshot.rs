@@ -27,7 +27,7 @@ use std::{
 
 /// The season at one instant, with the contents of one edition of the archive (the public or the organisers').
 #[derive(Debug)]
-pub struct Snapshot {
+pub struct DatabaseSnapshot {
     store: Store,
     file: PathBuf,
     /// Number of queued or running evaluations; in the organisers' edition, those of proposals are included. These
@@ -58,7 +58,7 @@ impl Store {
         program: &str,
         summaries: &MissingSummaries,
         now: Timestamp,
-    ) -> Result<Snapshot> {
+    ) -> Result<DatabaseSnapshot> {
         if let Some(archived) = &self.archive
             && archived.edition == Edition::Public
             && edition == Edition::Organiser
@@ -98,7 +98,7 @@ impl Store {
             probes: Arc::new(HealthProbes::new()),
             archive: archived.map(Arc::new),
         };
-        Ok(Snapshot {
+        Ok(DatabaseSnapshot {
             store,
             file,
             open_evaluations,
@@ -106,7 +106,7 @@ impl Store {
     }
 }
 
-impl Snapshot {
+impl DatabaseSnapshot {
     /// A store on the copy; its artifacts are those of the original.
     #[must_use]
     pub const fn store(&self) -> &Store {

@@ -97,7 +97,8 @@ impl Store {
             )?;
             let id = SubmissionId::new();
             submissions::insert(tx, id, team, &bundle, key, now).await?;
-            let account = queue::account(tx, purpose::VALIDATION.lane, &team.to_string()).await?;
+            let account =
+                queue::open_account(tx, purpose::VALIDATION.lane, &team.to_string()).await?;
             let job = queue::insert(tx, purpose::VALIDATION, account).await?;
             validation_runs::insert(tx, id, job).await?;
             let event = Event::SubmissionUploaded {

@@ -32,7 +32,7 @@ impl Store {
             }
             match submission.state {
                 SubmissionState::Valid | SubmissionState::Validating => {}
-                SubmissionState::Invalid { .. } | SubmissionState::ValidationError { .. } => {
+                SubmissionState::Invalid { .. } | SubmissionState::PlatformFailed { .. } => {
                     return StoreError::conflict(
                         "it is not valid and never evaluated: there is nothing to withdraw",
                     );

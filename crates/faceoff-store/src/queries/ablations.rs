@@ -40,7 +40,7 @@ async fn from_row(connection: &mut SqliteConnection, row: AblationRow) -> Result
             for run in progress::of_runs(connection, &runs).await?.into_values() {
                 progress.add(run);
             }
-            AblationState::Open {
+            AblationState::Unfinished {
                 progress,
                 episodes_total,
             }

@@ -24,7 +24,7 @@ impl Store {
     /// Gauges of the queue at `now`.
     #[boxed]
     pub async fn gauges(&self, now: Timestamp) -> Result<Gauges> {
-        let paused = self.season().await?.paused.is_some();
+        let paused = self.season().await?.queue_pause.is_some();
         let mut connection = self.database.read.acquire().await?;
         let queue = queue::gauges(&mut connection, now).await?;
         let open_evaluations = sqlx::query_scalar!(

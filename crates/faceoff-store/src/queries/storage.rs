@@ -31,7 +31,7 @@ pub enum StorageScope {
     All,
     /// Datasets that the team can download: of released days, and of no blind stage. The size of others would reveal
     /// something about their episodes.
-    Released,
+    VisibleToTeam,
 }
 
 /// A row of the statement. Bundles were called archives when its columns were named.

@@ -23,7 +23,7 @@ pub enum GameFilter {
     /// Test games and friendly games, the newest first; of one team or of all.
     TestAndFriendly(Option<TeamId>),
     /// Games of the schedule's replays, in order.
-    Replays,
+    ScheduleReplays,
 }
 
 /// A tournament with everything that its results depend on.
@@ -70,7 +70,7 @@ impl Store {
             GameFilter::TestAndFriendly(team) => {
                 games::test_and_friendly(&mut connection, id, team).await
             }
-            GameFilter::Replays => games::of_replays(&mut connection, id).await,
+            GameFilter::ScheduleReplays => games::of_schedule_replays(&mut connection, id).await,
         }
     }
 

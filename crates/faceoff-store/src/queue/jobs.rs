@@ -5,7 +5,7 @@ use crate::{
     error::Result,
     queue::{
         lease::seconds_later,
-        shares::{Account, Lane},
+        shares::{Lane, SlotTimeAccount},
     },
     write::Tx,
 };
@@ -26,7 +26,7 @@ pub(crate) struct NewJob {
 
 /// Queues a job, which can be claimed after its delay. The account must be one of its lane. Within the account, jobs of a
 /// batch are claimed in the order in which they were queued.
-pub(crate) async fn insert(tx: &mut Tx, job: NewJob, account: Account) -> Result<Uuid> {
+pub(crate) async fn insert(tx: &mut Tx, job: NewJob, account: SlotTimeAccount) -> Result<Uuid> {
     let id = Uuid::now_v7();
     sqlx::query!(
         "INSERT INTO jobs (id, kind, account_no, batch, state, claimable_at) VALUES (?, ?, ?, ?, 'queued', ?)",

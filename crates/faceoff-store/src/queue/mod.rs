@@ -19,4 +19,4 @@ pub(crate) use lease::{
     ClaimState, claim_state, is_holder, is_leased, lease_holder, leases, mark_done, park, release,
     renew, renew_all_leases, renew_leases, requeue_failed, transfer, unpark,
 };
-pub(crate) use shares::{Account, Lane, account};
+pub(crate) use shares::{Lane, SlotTimeAccount, open_account};

@@ -18,13 +18,13 @@ pub(crate) struct Lane {
 /// The number of an account: the record of the slot time that one owner (a team) has used in one lane, as in the fair-share scheduling of
 /// Slurm. It is no user account. Slot time of a lane is divided equally among the accounts with waiting jobs.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Account(pub(crate) i64);
+pub(crate) struct SlotTimeAccount(pub(crate) i64);
 
 /// Opens the account of `holder` (the owner) in `lane`, to queue jobs. An account that returns after a pause starts with
 /// the served time of the least served account that has waiting jobs, or else of the most served one. So unused time is no
 /// credit, and time used while no other account waited is no debt. The same holds for lanes. The charged rest of a running
 /// lease does not count as used.
-pub(crate) async fn account(tx: &mut Tx, lane: Lane, holder: &str) -> Result<Account> {
+pub(crate) async fn open_account(tx: &mut Tx, lane: Lane, holder: &str) -> Result<SlotTimeAccount> {
     let now = Instant(tx.now);
     sqlx::query!(
         "INSERT INTO lanes (lane, urgency, rank, served_ms)
@@ -70,5 +70,5 @@ pub(crate) async fn account(tx: &mut Tx, lane: Lane, holder: &str) -> Result<Acc
     )
     .fetch_one(&mut **tx)
     .await?;
-    Ok(Account(account))
+    Ok(SlotTimeAccount(account))
 }

@@ -26,7 +26,7 @@ pub struct Ablation {
 #[derive(Debug, Clone, PartialEq)]
 pub enum AblationState {
     /// Queued or running.
-    Open {
+    Unfinished {
         /// Of all profiles.
         progress: RunProgress,
         /// Episodes over all profiles and tasks.

@@ -5,7 +5,7 @@ use crate::{
     column::Instant,
     error::{Result, StoreError},
     event::Actor,
-    tables::submissions::VALIDATION_FAILED,
+    tables::submissions::REMOVED_AS_INVALID,
 };
 use faceoff_types::{SubmissionId, TeamId};
 use jiff::Timestamp;
@@ -237,7 +237,7 @@ pub(crate) async fn check_available(
         Some(row) => StoreError::conflict(format!(
             "the bundle of the submission {id} was removed on {} {}, so it cannot be evaluated again",
             row.at.0.strftime("%Y-%m-%d at %H:%M:%S UTC"),
-            row.reason.as_deref().unwrap_or(VALIDATION_FAILED),
+            row.reason.as_deref().unwrap_or(REMOVED_AS_INVALID),
         )),
     }
 }

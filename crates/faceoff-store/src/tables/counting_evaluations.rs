@@ -1,12 +1,12 @@
-//! Evaluations of a day or a team with the part of their state that organisers' rulings depend on: whether they are open,
+//! Evaluations of a day or a team with the part of their state that organisers' decisions depend on: whether they are open,
 //! count or are voided.
 
-use crate::{column::Instant, error::Result, tables::rulings::Ruling};
+use crate::{column::Instant, error::Result, tables::decision_records::DecisionRecord};
 use faceoff_types::{EvaluationId, StageDay, TeamId};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
-/// The part of an evaluation's state that a ruling depends on.
+/// The part of an evaluation's state that a decision depends on.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct EvaluationStatus {
     pub(crate) id: EvaluationId,
@@ -83,12 +83,12 @@ pub(crate) async fn open_of_team(
 pub(crate) async fn set_voided(
     connection: &mut SqliteConnection,
     id: EvaluationId,
-    ruling: &Ruling,
+    decision: &DecisionRecord,
 ) -> Result<()> {
     sqlx::query!(
         "UPDATE evaluations SET voided_at = ?, voided_for = ? WHERE id = ?",
-        Instant(ruling.at),
-        ruling.reason,
+        Instant(decision.at),
+        decision.reason,
         id,
     )
     .execute(connection)

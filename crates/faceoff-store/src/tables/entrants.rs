@@ -32,7 +32,7 @@ pub struct Departure {
 }
 
 /// The stored name of a kind of departure.
-const fn label(kind: DepartureKind) -> &'static str {
+const fn stored_name(kind: DepartureKind) -> &'static str {
     match kind {
         DepartureKind::Withdrawn => "withdrawn",
         DepartureKind::Disqualified => "disqualified",
@@ -68,7 +68,7 @@ pub(crate) async fn all(
                         ))
                     };
                     let kinds = [DepartureKind::Withdrawn, DepartureKind::Disqualified];
-                    let left_as = kinds.into_iter().find(|kind| label(*kind) == left_as);
+                    let left_as = kinds.into_iter().find(|kind| stored_name(*kind) == left_as);
                     Some(Departure {
                         kind: left_as.ok_or_else(damaged)?,
                         from_round: from_round.try_into().map_err(|_| damaged())?,
@@ -131,7 +131,7 @@ pub(crate) async fn set_departure(
     team: TeamId,
     departure: &Departure,
 ) -> Result<()> {
-    let (left_as, from_round) = (label(departure.kind), departure.from_round.get());
+    let (left_as, from_round) = (stored_name(departure.kind), departure.from_round.get());
     sqlx::query!(
         "UPDATE entrants SET left_as = ?, from_round = ?, left_at = ?, left_for = ?
          WHERE tournament_id = ? AND team_id = ?",

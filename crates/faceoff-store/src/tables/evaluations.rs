@@ -4,7 +4,9 @@
 use crate::{
     column::{Instant, Json},
     error::{Result, StoreError},
-    tables::{plan::RunPlan, progress::RunProgress, rulings::Ruling, runs::RunState},
+    tables::{
+        decision_records::DecisionRecord, plan::RunPlan, progress::RunProgress, runs::RunState,
+    },
 };
 use faceoff_types::{
     EvaluationId, EvaluationResult, Profile, ProposalId, RunId, StageDay, StageId, StageLimits,
@@ -37,11 +39,11 @@ pub struct Evaluation {
     /// The reason of an extra evaluation; `None` for the team's regular evaluation of the day.
     pub extra_for: Option<String>,
     /// Set if it was voided and does not count.
-    pub voided: Option<Ruling>,
+    pub voided: Option<DecisionRecord>,
     /// When its team published its dataset.
     pub published_at: Option<Timestamp>,
     /// Set if its dataset was removed; the reason names the retention.
-    pub dataset_removed: Option<Ruling>,
+    pub dataset_removed: Option<DecisionRecord>,
     pub state: EvaluationState,
 }
 
@@ -82,7 +84,7 @@ pub enum EvaluationState {
         episodes_total: u32,
     },
     /// All shards are committed, the score is being computed.
-    Finalising,
+    Scoring,
     Finished {
         /// When score and dataset were stored.
         finished_at: Timestamp,
@@ -105,7 +107,7 @@ pub enum EvaluationState {
         reason: String,
     },
     /// Incomplete at its day's deadline, for lack of server capacity.
-    NotPlayed {
+    DeadlineMissed {
         finished_at: Timestamp,
         /// Shown to the team.
         reason: String,
@@ -122,7 +124,7 @@ impl EvaluationState {
     /// Has the evaluation ended, with or without a result?
     #[must_use]
     pub const fn is_over(&self) -> bool {
-        !matches!(self, Self::Queued | Self::Running { .. } | Self::Finalising)
+        !matches!(self, Self::Queued | Self::Running { .. } | Self::Scoring)
     }
 }
 
@@ -222,7 +224,7 @@ impl EvaluationRow {
                 progress,
                 episodes_total,
             },
-            ("open", RunState::Complete) => EvaluationState::Finalising,
+            ("open", RunState::Complete) => EvaluationState::Scoring,
             ("finished", _) => EvaluationState::Finished {
                 finished_at: finished_at()?,
                 result: match self.result.take() {
@@ -242,7 +244,7 @@ impl EvaluationRow {
                 finished_at: finished_at()?,
                 reason: reason()?,
             },
-            ("cancelled", _) if self.unplayed => EvaluationState::NotPlayed {
+            ("cancelled", _) if self.unplayed => EvaluationState::DeadlineMissed {
                 finished_at: finished_at()?,
                 reason: reason()?,
             },
@@ -292,9 +294,9 @@ impl EvaluationRow {
             plan,
             created_at: self.created_at.0,
             extra_for: self.extra_for,
-            voided: Ruling::from_columns(self.voided_at, self.voided_for),
+            voided: DecisionRecord::from_columns(self.voided_at, self.voided_for),
             published_at: self.published_at.map(|at| at.0),
-            dataset_removed: Ruling::from_columns(
+            dataset_removed: DecisionRecord::from_columns(
                 self.dataset_removed_at,
                 self.dataset_removed_for,
             ),
@@ -493,7 +495,7 @@ pub(crate) enum Failure<'a> {
     /// An organiser cancelled it, for this reason.
     Cancelled(&'a str),
     /// Its day's deadline passed. The text is shown to the team.
-    NotPlayed(&'a str),
+    DeadlineMissed(&'a str),
 }
 
 pub(crate) async fn set_failed(
@@ -505,15 +507,15 @@ pub(crate) async fn set_failed(
     let (state, reason) = match failure {
         Failure::Agent => ("agent_failed", None),
         Failure::Platform(reason) => ("platform_failed", Some(reason)),
-        Failure::Cancelled(reason) | Failure::NotPlayed(reason) => ("cancelled", Some(reason)),
+        Failure::Cancelled(reason) | Failure::DeadlineMissed(reason) => ("cancelled", Some(reason)),
     };
-    let unplayed = matches!(failure, Failure::NotPlayed(_));
+    let deadline_missed = matches!(failure, Failure::DeadlineMissed(_));
     sqlx::query!(
         "UPDATE evaluations SET state = ?, finished_at = ?, reason = ?, unplayed = ? WHERE id = ?",
         state,
         Instant(now),
         reason,
-        unplayed,
+        deadline_missed,
         id,
     )
     .execute(connection)

@@ -36,7 +36,7 @@ pub enum GamePurpose {
         asked_by: TeamId,
     },
     /// A game of a replay: all games of all rounds are repeated, to measure how certain the winner is.
-    Replay {
+    ScheduleReplay {
         /// Number of the replay, from 1.
         replay: u32,
         /// The game that is repeated.
@@ -134,12 +134,12 @@ pub struct GameCommit {
 }
 
 impl GamePurpose {
-    pub(super) const fn label(self) -> &'static str {
+    pub(super) const fn stored_name(self) -> &'static str {
         match self {
             Self::Round(_) => "round",
             Self::Test { .. } => "test",
             Self::Friendly { .. } => "friendly",
-            Self::Replay { .. } => "replay",
+            Self::ScheduleReplay { .. } => "replay",
         }
     }
 
@@ -147,10 +147,11 @@ impl GamePurpose {
     #[must_use]
     pub const fn schedule_entry(self) -> Option<ScheduleEntry> {
         match self {
-            Self::Round(entry)
-            | Self::Replay {
-                original: entry, ..
-            } => Some(entry),
+            Self::Round(schedule_entry)
+            | Self::ScheduleReplay {
+                original: schedule_entry,
+                ..
+            } => Some(schedule_entry),
             Self::Test { .. } | Self::Friendly { .. } => None,
         }
     }
@@ -158,6 +159,6 @@ impl GamePurpose {
     /// Is the game's recording stored?
     #[must_use]
     pub const fn keeps_recording(self) -> bool {
-        !matches!(self, Self::Replay { .. })
+        !matches!(self, Self::ScheduleReplay { .. })
     }
 }

@@ -58,7 +58,7 @@ impl GameRow {
             "friendly" => GamePurpose::Friendly {
                 asked_by: asked_by?,
             },
-            "replay" => GamePurpose::Replay {
+            "replay" => GamePurpose::ScheduleReplay {
                 replay: self.replay?,
                 original: entry()?,
             },
@@ -177,7 +177,7 @@ pub(crate) struct PendingGame {
 }
 
 /// The pending games of all rounds, in the order of play.
-pub(crate) async fn pending(
+pub(crate) async fn pending_of_rounds(
     connection: &mut SqliteConnection,
     tournament: TournamentId,
 ) -> Result<Vec<PendingGame>> {
@@ -204,7 +204,7 @@ pub(crate) async fn pending(
 }
 
 /// The games of all replays of the schedule, in order.
-pub(crate) async fn of_replays(
+pub(crate) async fn of_schedule_replays(
     connection: &mut SqliteConnection,
     tournament: TournamentId,
 ) -> Result<Vec<Game>> {
@@ -233,7 +233,7 @@ pub(crate) async fn test_and_friendly(
 }
 
 /// All queued and running games of a tournament.
-pub(crate) async fn open(
+pub(crate) async fn unfinished(
     connection: &mut SqliteConnection,
     tournament: TournamentId,
 ) -> Result<Vec<Game>> {
@@ -269,7 +269,7 @@ pub(crate) async fn insert(
     game: &Game,
     job: Uuid,
 ) -> Result<()> {
-    let (id, tournament, purpose) = (game.id, game.tournament, game.purpose.label());
+    let (id, tournament, purpose) = (game.id, game.tournament, game.purpose.stored_name());
     let (round, matchday, pairing, second_half) = match game.purpose.schedule_entry() {
         None => (None, None, None, None),
         Some(entry) => (
@@ -283,7 +283,7 @@ pub(crate) async fn insert(
         GamePurpose::Round(_) => (None, None),
         GamePurpose::Test { asked_by } => (None, asked_by),
         GamePurpose::Friendly { asked_by } => (None, Some(asked_by)),
-        GamePurpose::Replay { replay, .. } => (Some(replay), None),
+        GamePurpose::ScheduleReplay { replay, .. } => (Some(replay), None),
     };
     let [home, away] = game.teams;
     let [home_submission, away_submission] = game.submissions;

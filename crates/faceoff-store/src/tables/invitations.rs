@@ -45,7 +45,8 @@ impl InvitationRole {
 /// State of an invitation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InvitationState {
-    Open,
+    /// It can be accepted until it expires.
+    Unused,
     Accepted {
         user: UserId,
         accepted_at: Timestamp,
@@ -93,7 +94,7 @@ impl TryFrom<InvitationRow> for Invitation {
                 accepted_at: at.0,
             },
             (_, _, Some(at)) => InvitationState::Revoked { revoked_at: at.0 },
-            _ => InvitationState::Open,
+            _ => InvitationState::Unused,
         };
         Ok(Self {
             id: row.id,

@@ -47,7 +47,7 @@ impl ProposalKind {
         }
     }
 
-    const fn label(self) -> &'static str {
+    const fn stored_name(self) -> &'static str {
         match self {
             Self::Trial => "trial",
             Self::Evaluation(_) => "evaluation",
@@ -56,8 +56,8 @@ impl ProposalKind {
         }
     }
 
-    fn from_columns(label: &str, day: Option<Date>) -> Option<Self> {
-        Some(match (label, day) {
+    fn from_columns(stored_name: &str, day: Option<Date>) -> Option<Self> {
+        Some(match (stored_name, day) {
             ("trial", None) => Self::Trial,
             ("evaluation", Some(day)) => Self::Evaluation(day),
             ("day", Some(day)) => Self::Day(day),
@@ -146,7 +146,7 @@ pub(crate) async fn insert(connection: &mut SqliteConnection, proposal: &Proposa
         proposal.id,
         proposal.stage,
         proposal.revision,
-        proposal.kind.label(),
+        proposal.kind.stored_name(),
         proposal.kind.day().map(Text),
         proposal.reason,
         Instant(proposal.created_at),
@@ -161,13 +161,13 @@ pub(crate) async fn set_outcome(
     id: ProposalId,
     outcome: ProposalOutcome,
 ) -> Result<()> {
-    let (label, decided_at) = match outcome {
+    let (outcome_name, decided_at) = match outcome {
         ProposalOutcome::Applied(at) => ("applied", at),
         ProposalOutcome::Dropped(at) => ("dropped", at),
     };
     sqlx::query!(
         "UPDATE proposals SET outcome = ?, settled_at = ? WHERE id = ?",
-        label,
+        outcome_name,
         Instant(decided_at),
         id,
     )

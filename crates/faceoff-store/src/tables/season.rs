@@ -3,7 +3,7 @@
 use crate::{
     column::{Bytes32, Instant},
     error::{Result, StoreError},
-    tables::rulings::Ruling,
+    tables::decision_records::DecisionRecord,
 };
 use faceoff_types::Seed;
 use jiff::Timestamp;
@@ -25,7 +25,7 @@ pub struct Season {
     /// `None` while the season is open.
     pub closed_at: Option<Timestamp>,
     /// Set while the queue is paused: no job starts.
-    pub paused: Option<Ruling>,
+    pub queue_pause: Option<DecisionRecord>,
     /// Is registration of teams open to everyone?
     pub registration_open: bool,
 }
@@ -51,7 +51,7 @@ pub(crate) async fn read(connection: &mut SqliteConnection) -> Result<Season> {
         },
         created_at: row.created_at.0,
         closed_at: row.closed_at.map(|at| at.0),
-        paused: Ruling::from_columns(row.paused_at, row.paused_for),
+        queue_pause: DecisionRecord::from_columns(row.paused_at, row.paused_for),
         registration_open: row.takes_registrations,
     })
 }
@@ -109,10 +109,10 @@ pub(crate) async fn is_paused(connection: &mut SqliteConnection) -> Result<bool>
 /// Pauses the queue, or resumes it.
 pub(crate) async fn set_paused(
     connection: &mut SqliteConnection,
-    ruling: Option<&Ruling>,
+    decision: Option<&DecisionRecord>,
 ) -> Result<()> {
-    let at = ruling.map(|ruling| Instant(ruling.at));
-    let reason = ruling.map(|ruling| &ruling.reason);
+    let at = decision.map(|decision| Instant(decision.at));
+    let reason = decision.map(|decision| &decision.reason);
     sqlx::query!(
         "UPDATE season SET paused_at = ?, paused_for = ?",
         at,

@@ -4,7 +4,7 @@ use crate::{
     column::{Instant, Json},
     error::{Result, StoreError},
     event::Actor,
-    tables::rulings::Ruling,
+    tables::decision_records::DecisionRecord,
 };
 use faceoff_types::{BundleRef, IdempotencyKey, SubmissionId, TeamId, ValidationTiming};
 use jiff::Timestamp;
@@ -37,15 +37,15 @@ pub struct Submission {
     /// The team's first submission of the same bundle, if this is a later one.
     pub duplicate_of: Option<SubmissionId>,
     /// Set if its bundle was removed: it cannot be evaluated any more.
-    pub bundle_removed: Option<Ruling>,
-    /// Set if the removal was requested.
-    pub deleted: Option<Deletion>,
+    pub bundle_removed: Option<DecisionRecord>,
+    /// Set if the bundle was removed on request of its team or of an organiser, and not by the stage's retention.
+    pub deletion_request: Option<DeletionRequest>,
 }
 
 /// The requested removal of a submission's bundle.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Deletion {
-    pub deleted_at: Timestamp,
+pub struct DeletionRequest {
+    pub requested_at: Timestamp,
     pub actor: Actor,
 }
 
@@ -62,7 +62,7 @@ pub enum SubmissionState {
         reason: String,
     },
     /// Given up after platform faults in several attempts; the team may upload again.
-    ValidationError { reason: String },
+    PlatformFailed { reason: String },
 }
 
 impl SubmissionState {
@@ -74,7 +74,7 @@ impl SubmissionState {
 }
 
 /// Reason of the removal of a bundle that did not pass its validation run.
-pub(crate) const VALIDATION_FAILED: &str = "because its validation run failed";
+pub(crate) const REMOVED_AS_INVALID: &str = "because its validation run failed";
 
 struct SubmissionRow {
     id: SubmissionId,
@@ -108,7 +108,7 @@ impl TryFrom<SubmissionRow> for Submission {
             ("validating", None) => SubmissionState::Validating,
             ("valid", None) => SubmissionState::Valid,
             ("invalid", Some(reason)) => SubmissionState::Invalid { reason },
-            ("validation_error", Some(reason)) => SubmissionState::ValidationError { reason },
+            ("validation_error", Some(reason)) => SubmissionState::PlatformFailed { reason },
             (state, _) => {
                 return Err(StoreError::Damaged(format!(
                     "submission {}: state {state:?} does not match its reason",
@@ -135,19 +135,18 @@ impl TryFrom<SubmissionRow> for Submission {
             label: row.label,
             note: row.note,
             duplicate_of: row.same_as,
-            bundle_removed: row.removed_at.map(|at| Ruling {
+            bundle_removed: row.removed_at.map(|at| DecisionRecord {
                 at: at.0,
                 reason: row
                     .removed_for
-                    .unwrap_or_else(|| VALIDATION_FAILED.to_owned()),
+                    .unwrap_or_else(|| REMOVED_AS_INVALID.to_owned()),
             }),
-            deleted: row
-                .deleted_at
-                .zip(row.deleted_by)
-                .map(|(at, actor)| Deletion {
-                    deleted_at: at.0,
+            deletion_request: row.deleted_at.zip(row.deleted_by).map(|(at, actor)| {
+                DeletionRequest {
+                    requested_at: at.0,
                     actor,
-                }),
+                }
+            }),
         })
     }
 }

@@ -3,7 +3,7 @@
 use crate::{
     column::Instant,
     error::{Result, StoreError},
-    tables::{rulings::Ruling, terms, users},
+    tables::{decision_records::DecisionRecord, terms, users},
 };
 use faceoff_types::{DivisionName, StageName, TeamId, TeamName, name_skeleton};
 use jiff::Timestamp;
@@ -18,7 +18,7 @@ pub struct Team {
     pub name: TeamName,
     pub created_at: Timestamp,
     /// Set while the team is disqualified: it is neither evaluated nor ranked.
-    pub disqualified: Option<Ruling>,
+    pub disqualified: Option<DecisionRecord>,
     pub profile: TeamProfile,
     /// When the team withdrew from the season; its results stay.
     pub retired_at: Option<Timestamp>,
@@ -54,7 +54,7 @@ impl From<TeamRow> for Team {
             id: row.id,
             name: row.name,
             created_at: row.created_at.0,
-            disqualified: Ruling::from_columns(row.disqualified_at, row.disqualified_for),
+            disqualified: DecisionRecord::from_columns(row.disqualified_at, row.disqualified_for),
             profile: TeamProfile {
                 affiliation: row.affiliation,
                 link: row.link,
@@ -198,7 +198,7 @@ pub(crate) async fn signed_off_stage(
 #[derive(Debug)]
 pub(crate) enum Evidence {
     /// The team is disqualified.
-    Disqualified(Ruling),
+    Disqualified(DecisionRecord),
     /// An organiser retired the team at this time.
     Retired(Timestamp),
 }
@@ -215,21 +215,22 @@ pub(crate) async fn evidence(
     .fetch_optional(connection)
     .await?
     .ok_or(StoreError::NotFound("team"))?;
-    if let Some(ruling) = Ruling::from_columns(row.disqualified_at, row.disqualified_for) {
-        return Ok(Some(Evidence::Disqualified(ruling)));
+    if let Some(decision) = DecisionRecord::from_columns(row.disqualified_at, row.disqualified_for)
+    {
+        return Ok(Some(Evidence::Disqualified(decision)));
     }
     let retired_at = row.retired_at.filter(|_| row.by_organiser);
     Ok(retired_at.map(|at| Evidence::Retired(at.0)))
 }
 
-/// Disqualifies a team by the ruling; `None` reinstates it.
+/// Disqualifies a team by the decision; `None` reinstates it.
 pub(crate) async fn set_disqualified(
     connection: &mut SqliteConnection,
     id: TeamId,
-    ruling: Option<&Ruling>,
+    decision: Option<&DecisionRecord>,
 ) -> Result<()> {
-    let disqualified_at = ruling.map(|ruling| Instant(ruling.at));
-    let reason = ruling.map(|ruling| &ruling.reason);
+    let disqualified_at = decision.map(|decision| Instant(decision.at));
+    let reason = decision.map(|decision| &decision.reason);
     sqlx::query!(
         "UPDATE teams SET disqualified_at = ?, disqualified_for = ? WHERE id = ?",
         disqualified_at,
@@ -244,7 +245,7 @@ pub(crate) async fn set_disqualified(
 /// Refuses a team that is disqualified, has retired, or has not accepted the terms.
 pub(crate) async fn check_may_compete(connection: &mut SqliteConnection, id: TeamId) -> Result<()> {
     let team = find(connection, id).await?;
-    if let Some(Ruling { at, reason }) = team.disqualified {
+    if let Some(DecisionRecord { at, reason }) = team.disqualified {
         return Err(StoreError::Disqualified { at, reason });
     }
     if let Some(at) = team.retired_at {

@@ -3,7 +3,7 @@
 use crate::{
     column::{Instant, Json},
     error::{Result, StoreError},
-    tables::rulings::Ruling,
+    tables::decision_records::DecisionRecord,
 };
 use faceoff_types::{
     StageId, StageName, SubmissionId, TournamentId, TournamentRules, TournamentSettings,
@@ -30,7 +30,7 @@ pub struct Tournament {
     /// The organisers' agent, the opponent in test games.
     pub baseline: Option<SubmissionId>,
     /// Set while the tournament is paused: no game starts.
-    pub paused: Option<Ruling>,
+    pub paused: Option<DecisionRecord>,
     /// Set once the tournament is closed: then it cannot be changed.
     pub closed_at: Option<Timestamp>,
 }
@@ -60,7 +60,7 @@ impl From<TournamentRow> for Tournament {
             rules: row.rules.0,
             settings: row.settings.0,
             baseline: row.baseline,
-            paused: Ruling::from_columns(row.paused_at, row.paused_for),
+            paused: DecisionRecord::from_columns(row.paused_at, row.paused_for),
             closed_at: row.closed_at.map(|at| at.0),
         }
     }

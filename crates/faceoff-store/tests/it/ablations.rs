@@ -45,7 +45,7 @@ impl TestStore {
         };
         self.store
             .request_ablation(
-                Actor::Organiser,
+                Actor::Host,
                 submission,
                 faceoff_airhockey::RULESET,
                 &plan,
@@ -84,7 +84,7 @@ async fn ablation_runs_each_profile_and_task_once() {
     assert_eq!(f.store.newest_ablation(submission.id).await.unwrap(), None);
     let ablation = f.request_ablation(submission.id).await;
     let episodes_done = |state: AblationState| match state {
-        AblationState::Open {
+        AblationState::Unfinished {
             progress,
             episodes_total,
         } => {

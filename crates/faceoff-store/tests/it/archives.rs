@@ -155,7 +155,7 @@ async fn season_with_queued_day() -> (TestStore, EvaluationId) {
         expires_at: f.now + jiff::SignedDuration::from_hours(1),
     };
     f.store
-        .invite(Actor::Organiser, invitation, f.now)
+        .invite(Actor::Host, invitation, f.now)
         .await
         .unwrap();
     f.store
@@ -170,7 +170,7 @@ async fn season_with_queued_day() -> (TestStore, EvaluationId) {
         secret: [9; 32],
         requester: Requester::default(),
     };
-    let webhook = f.store.create_webhook(Actor::Organiser, webhook, f.now);
+    let webhook = f.store.create_webhook(Actor::Host, webhook, f.now);
     let webhook = webhook.await.unwrap().id;
     let delivery = f.store.test_webhook(webhook, "test", "{}", f.now);
     delivery.await.unwrap();
@@ -326,14 +326,12 @@ async fn public_archive_omits_lifted_rulings_and_private_answers() {
     f.evaluate(alpha.id, &one_shard_plan()).await;
     f.run_all_with_score(1.0).await;
     for (team, reason) in [(alpha.team, "it copied"), (beta.team, "it attacked")] {
-        let disqualified = f
-            .store
-            .disqualify_team(Actor::Organiser, team, reason, f.now);
+        let disqualified = f.store.disqualify_team(Actor::Host, team, reason, f.now);
         disqualified.await.unwrap();
     }
     let reinstated = f
         .store
-        .reinstate_team(Actor::Organiser, alpha.team, "it did not copy", f.now);
+        .reinstate_team(Actor::Host, alpha.team, "it did not copy", f.now);
     reinstated.await.unwrap();
     for public in [true, false] {
         let question = f
@@ -343,22 +341,22 @@ async fn public_archive_omits_lifted_rulings_and_private_answers() {
             .unwrap();
         let answer = f
             .store
-            .answer(Actor::Organiser, question.id, "so", public, f.now);
+            .answer(Actor::Host, question.id, "so", public, f.now);
         answer.await.unwrap();
     }
     let folder = export(&f, Edition::Public).await;
     Store::import(folder.path(), f.now).await.unwrap();
     let imported = Store::open(folder.path()).await.unwrap();
     let mut connection = open(&database(&folder)).await;
-    let rulings: Vec<(String, String)> = sqlx::query_as(
+    let disqualifications: Vec<(String, String)> = sqlx::query_as(
         "SELECT subject_id, payload FROM events WHERE kind LIKE 'team_%' AND kind <> 'team_created'",
     )
     .fetch_all(&mut connection)
     .await
     .unwrap();
-    assert_eq!(rulings.len(), 1, "{rulings:?}");
-    assert_eq!(rulings[0].0, beta.team.to_string());
-    assert!(rulings[0].1.contains("it attacked"));
+    assert_eq!(disqualifications.len(), 1, "{disqualifications:?}");
+    assert_eq!(disqualifications[0].0, beta.team.to_string());
+    assert!(disqualifications[0].1.contains("it attacked"));
     let questions = imported.questions().await.unwrap();
     assert_eq!(questions.len(), 1);
     assert_eq!((&*questions[0].text, questions[0].team), ("how?", None));
@@ -382,7 +380,7 @@ async fn snapshot_is_unaffected_by_later_changes() {
     assert_eq!(snapshot.open_evaluations, 2);
     let before = snapshot.store().evaluation(finished).await.unwrap();
     f.store
-        .void_evaluation(Actor::Organiser, finished, "a mistake", f.now)
+        .void_evaluation(Actor::Host, finished, "a mistake", f.now)
         .await
         .unwrap();
     assert_eq!(snapshot.store().evaluation(finished).await.unwrap(), before);
@@ -608,7 +606,7 @@ async fn public_archive_has_only_games_that_count() {
     };
     let cup = f
         .store
-        .open_tournament(Actor::Organiser, &tournament, f.now)
+        .open_tournament(Actor::Host, &tournament, f.now)
         .await
         .unwrap();
     let friendly =
@@ -626,7 +624,7 @@ async fn public_archive_has_only_games_that_count() {
             }],
         };
         f.store
-            .start_round(Actor::Organiser, cup.id, &round, f.now)
+            .start_round(Actor::Host, cup.id, &round, f.now)
             .await
             .unwrap();
         if number == 1 {

@@ -76,7 +76,7 @@ async fn submission_reaches_board_after_upload_and_runs() {
         "outcomes are read exactly as they were stored"
     );
 
-    assert_eq!(f.state(evaluation.id).await, EvaluationState::Finalising);
+    assert_eq!(f.state(evaluation.id).await, EvaluationState::Scoring);
     assert!(f.board().await.is_empty());
     let Some(ClaimedJob {
         claim,

@@ -118,7 +118,7 @@ async fn deadline_ends_open_evaluations_and_releases_the_day() {
             .id
     };
     // Beta's evaluation is complete but not scored; Alpha's is half done.
-    while f.state(id_of(beta.team)).await != EvaluationState::Finalising {
+    while f.state(id_of(beta.team)).await != EvaluationState::Scoring {
         let (_, team) = run_shard(&f).await;
         if team == alpha.team {
             break;
@@ -143,7 +143,7 @@ async fn deadline_ends_open_evaluations_and_releases_the_day() {
             other => panic!("expected a shard or a scoring job, claimed {other:?}"),
         }
     };
-    while f.state(id_of(beta.team)).await != EvaluationState::Finalising {
+    while f.state(id_of(beta.team)).await != EvaluationState::Scoring {
         run_shard(&f).await;
     }
     let events = f.store.events_after(0, 1000).await.unwrap();
@@ -155,7 +155,7 @@ async fn deadline_ends_open_evaluations_and_releases_the_day() {
     let overdue = second[0].stage_day;
     let ended = f.store.end_overdue_days(f.now).await.unwrap();
     assert_eq!(ended, [(overdue, 1)]);
-    let EvaluationState::NotPlayed {
+    let EvaluationState::DeadlineMissed {
         finished_at,
         reason,
     } = f.state(id_of(alpha.team)).await
@@ -208,7 +208,7 @@ async fn deadline_ends_open_evaluations_and_releases_the_day() {
     // An organiser can rerun the evaluation, without a deadline.
     let rerun = f
         .store
-        .rerun_evaluation(Actor::Organiser, id_of(alpha.team), f.now)
+        .rerun_evaluation(Actor::Host, id_of(alpha.team), f.now)
         .await
         .unwrap();
     f.advance_clock_s(3600);
@@ -243,13 +243,13 @@ async fn overdue_day_without_scoring_is_released_at_once() {
         EvaluationState::PlatformFailed { .. }
     ));
     let evaluations = f.store.evaluations_of_day(day.stage_day).await.unwrap();
-    let not_played = evaluations
+    let deadline_missed = evaluations
         .iter()
         .find(|evaluation| evaluation.id != failed)
         .unwrap();
     assert!(matches!(
-        not_played.state,
-        EvaluationState::NotPlayed { .. }
+        deadline_missed.state,
+        EvaluationState::DeadlineMissed { .. }
     ));
     assert!(f.claim().await.is_none());
 }
@@ -263,9 +263,7 @@ async fn closed_stage_continues_its_day_until_the_deadline() {
         closes_at: Some(Some(time("2026-03-01T12:00:00Z"))),
         ..StageChange::default()
     };
-    let changed = f
-        .store
-        .change_stage(Actor::Organiser, stage, closing, f.now);
+    let changed = f.store.change_stage(Actor::Host, stage, closing, f.now);
     changed.await.unwrap();
     start_day(&f, stage).await;
     f.advance_clock_s(4 * 3600);

@@ -31,7 +31,7 @@ async fn events_record_each_step_of_a_submission() {
         .unwrap();
     f.store
         .set_team_token(
-            Actor::Organiser,
+            Actor::Host,
             submission.team,
             [9; 32],
             Requester::default(),
@@ -41,7 +41,7 @@ async fn events_record_each_step_of_a_submission() {
         .unwrap();
     let mut records = stored_events(&f).await;
     let first = records.remove(0);
-    assert_eq!(first.actor, Actor::Organiser);
+    assert_eq!(first.actor, Actor::Host);
     assert!(matches!(first.event, Event::StageCreated { .. }));
     assert_eq!(
         event_kinds(&records),
@@ -83,8 +83,8 @@ async fn events_record_each_step_of_a_submission() {
     );
     assert_eq!(
         records[9].event,
-        Event::UnitGivenBack {
-            unit: claim.job,
+        Event::JobReturned {
+            job: claim.job,
             failures: 1,
             reason: "disk full".into(),
         }
@@ -129,7 +129,7 @@ async fn events_record_each_end_of_an_evaluation() {
             End::Cancelled => {
                 let cancelled =
                     f.store
-                        .cancel_evaluation(Actor::Organiser, evaluation.id, "rain", f.now);
+                        .cancel_evaluation(Actor::Host, evaluation.id, "rain", f.now);
                 cancelled.await.unwrap();
             }
             End::PlatformFailed => {
@@ -163,12 +163,9 @@ async fn failed_operation_changes_nothing_and_sends_no_event() {
     let evaluation = f.start_evaluation(&six_shard_plan()).await;
     let cancelled = f
         .store
-        .cancel_evaluation(Actor::Organiser, evaluation.id, "rain", f.now);
+        .cancel_evaluation(Actor::Host, evaluation.id, "rain", f.now);
     cancelled.await.unwrap();
-    let rerun = || {
-        f.store
-            .rerun_evaluation(Actor::Organiser, evaluation.id, f.now)
-    };
+    let rerun = || f.store.rerun_evaluation(Actor::Host, evaluation.id, f.now);
     rerun().await.unwrap();
     let events_before = stored_events(&f).await;
     let (mut events, mut signal) = (f.store.events(), f.store.job_signal());

@@ -14,7 +14,7 @@ async fn evaluation_at_fault_limit_is_scored() {
         let (claim, _, shard) = f.claim_shard().await;
         f.commit_shard(&claim, &shard, faults).await;
     }
-    assert_eq!(f.state(evaluation.id).await, EvaluationState::Finalising);
+    assert_eq!(f.state(evaluation.id).await, EvaluationState::Scoring);
 }
 
 #[tokio::test]
@@ -73,7 +73,7 @@ async fn evaluation_above_fault_limit_ends_without_score() {
     assert!(f.board().await.is_empty());
     let rerun = f
         .store
-        .rerun_evaluation(Actor::Organiser, evaluation.id, f.now)
+        .rerun_evaluation(Actor::Host, evaluation.id, f.now)
         .await;
     assert!(
         matches!(rerun, Err(StoreError::Conflict(_))),

@@ -499,7 +499,7 @@ async fn migration_keeps_all_old_rows() {
     let log = f.store.submission_log(id(3)).await.unwrap();
     assert_eq!(log.as_deref(), Some("oops"));
     let reason = "no cgroup".to_owned();
-    let error = SubmissionState::ValidationError { reason };
+    let error = SubmissionState::PlatformFailed { reason };
     assert_eq!(submission(4).await.state, error);
     assert_eq!(submission(11).await.state, SubmissionState::Valid);
 
@@ -520,7 +520,7 @@ async fn migration_keeps_all_old_rows() {
                 episodes_total: 12,
             },
         ),
-        (1300, EvaluationState::Finalising),
+        (1300, EvaluationState::Scoring),
         (
             1400,
             EvaluationState::Finished {
@@ -655,7 +655,7 @@ async fn migration_splits_old_ablations_into_runs() {
     let expected = [
         (
             11,
-            AblationState::Open {
+            AblationState::Unfinished {
                 progress: RunProgress {
                     episodes_done: 3,
                     commits: vec![ShardProgress {
@@ -838,7 +838,7 @@ async fn migrated_queue_continues() {
         matches!(repeated, Err(StoreError::CutoffPassed { .. })),
         "{repeated:?}"
     );
-    let rerun = f.store.rerun_evaluation(Actor::Organiser, id(1600), f.now);
+    let rerun = f.store.rerun_evaluation(Actor::Host, id(1600), f.now);
     assert_eq!(rerun.await.unwrap().submission, id(16));
     // Old recordings are deleted a day after the end of their evaluation, like new ones.
     f.advance_clock_s(86_400);

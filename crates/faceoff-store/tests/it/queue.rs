@@ -415,7 +415,7 @@ async fn failed_validation_run_ends_as_platform_fault() {
     let state = f.store.submission(submission.id).await.unwrap().state;
     assert_eq!(
         state,
-        SubmissionState::ValidationError {
+        SubmissionState::PlatformFailed {
             reason: "no cgroup".into()
         }
     );

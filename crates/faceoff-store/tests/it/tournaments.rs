@@ -29,7 +29,7 @@ async fn opened(
         settings: TournamentSettings::default(),
         entrants: teams.clone(),
     };
-    let opened = f.store.open_tournament(Actor::Organiser, &new, f.now).await;
+    let opened = f.store.open_tournament(Actor::Host, &new, f.now).await;
     (opened.unwrap(), teams)
 }
 
@@ -56,9 +56,7 @@ async fn start(
     id: TournamentId,
     drawn: &DrawnRound,
 ) -> Result<TournamentRound, StoreError> {
-    f.store
-        .start_round(Actor::Organiser, id, drawn, f.now)
-        .await
+    f.store.start_round(Actor::Host, id, drawn, f.now).await
 }
 
 /// A tournament of two teams whose first round, of one game, has started.
@@ -293,7 +291,7 @@ async fn round_needs_a_valid_submission_of_each_team() {
     .await;
     let late = f.create_team("Late").await;
     f.store
-        .add_entrants(Actor::Organiser, cup.id, &[late.id], f.now)
+        .add_entrants(Actor::Host, cup.id, &[late.id], f.now)
         .await
         .unwrap();
     let round = drawn(1, &[&[[teams[0], late.id]]], &[teams[1]]);
@@ -305,7 +303,7 @@ async fn round_needs_a_valid_submission_of_each_team() {
     let out = departure(late.id, DepartureKind::Withdrawn, None);
     let left = f
         .store
-        .leave_tournament(Actor::Organiser, cup.id, &out, f.now)
+        .leave_tournament(Actor::Host, cup.id, &out, f.now)
         .await;
     assert_eq!(
         left.unwrap(),
@@ -317,7 +315,7 @@ async fn round_needs_a_valid_submission_of_each_team() {
     start(&f, cup.id, &two).await.unwrap();
     assert_conflict(
         f.store
-            .add_entrants(Actor::Organiser, cup.id, &[late.id], f.now)
+            .add_entrants(Actor::Host, cup.id, &[late.id], f.now)
             .await,
         &["a round is under way"],
     );
@@ -386,24 +384,18 @@ async fn game_with_platform_faults_has_attempts_but_no_result() {
         "a result is missing"
     );
     assert_conflict(
-        f.store
-            .close_tournament(Actor::Organiser, cup.id, f.now)
-            .await,
+        f.store.close_tournament(Actor::Host, cup.id, f.now).await,
         &["has no result"],
     );
     let seed = f.store.game(game).await.unwrap().seed;
-    let rerun = f
-        .store
-        .rerun_game(Actor::Organiser, game, f.now)
-        .await
-        .unwrap();
+    let rerun = f.store.rerun_game(Actor::Host, game, f.now).await.unwrap();
     assert_eq!((rerun.seed, rerun.state), (seed, GameState::Queued));
     run_next_game(&f).await;
     assert!(record(&f, cup.id).await.rounds[0].over_at.is_some());
     // Its result counts until it is voided; then the game is rerun with the same rules.
     let voided = f
         .store
-        .void_game(Actor::Organiser, game, REASON, f.now)
+        .void_game(Actor::Host, game, REASON, f.now)
         .await
         .unwrap();
     assert!(matches!(voided.state, GameState::Void { reason, .. } if reason == REASON));
@@ -418,17 +410,12 @@ async fn game_with_platform_faults_has_attempts_but_no_result() {
         &["have no result"],
     );
     assert_conflict(
-        f.store
-            .void_game(Actor::Organiser, game, REASON, f.now)
-            .await,
+        f.store.void_game(Actor::Host, game, REASON, f.now).await,
         &["only a game"],
     );
-    f.store
-        .rerun_game(Actor::Organiser, game, f.now)
-        .await
-        .unwrap();
+    f.store.rerun_game(Actor::Host, game, f.now).await.unwrap();
     assert_conflict(
-        f.store.rerun_game(Actor::Organiser, game, f.now).await,
+        f.store.rerun_game(Actor::Host, game, f.now).await,
         &["only a game"],
     );
     run_next_game(&f).await;
@@ -444,12 +431,12 @@ async fn paused_tournament_starts_no_game() {
     let (cup, teams) = one_game(&f, faceoff_airhockey::competition().tournament_rules()).await;
     let paused = f
         .store
-        .pause_tournament(Actor::Organiser, cup.id, REASON, f.now)
+        .pause_tournament(Actor::Host, cup.id, REASON, f.now)
         .await;
     assert_eq!(paused.unwrap().paused.unwrap().reason, REASON);
     assert_conflict(
         f.store
-            .pause_tournament(Actor::Organiser, cup.id, REASON, f.now)
+            .pause_tournament(Actor::Host, cup.id, REASON, f.now)
             .await,
         &["paused already"],
     );
@@ -461,13 +448,11 @@ async fn paused_tournament_starts_no_game() {
     let game = record(&f, cup.id).await.games[0].id;
     assert_eq!(f.store.game_attempts(game).await.unwrap(), []);
     f.store
-        .resume_tournament(Actor::Organiser, cup.id, f.now)
+        .resume_tournament(Actor::Host, cup.id, f.now)
         .await
         .unwrap();
     assert_conflict(
-        f.store
-            .resume_tournament(Actor::Organiser, cup.id, f.now)
-            .await,
+        f.store.resume_tournament(Actor::Host, cup.id, f.now).await,
         &["not paused"],
     );
     assert_eq!(run_next_game(&f).await, game);
@@ -504,7 +489,7 @@ async fn game_forecast_uses_recent_durations() {
     assert_eq!(position(&f, ids[1]).await, Some((1, 2, at(40))));
     assert_eq!(position(&f, ids[2]).await, Some((2, 2, at(80))));
     f.store
-        .pause_tournament(Actor::Organiser, cup.id, REASON, f.now)
+        .pause_tournament(Actor::Host, cup.id, REASON, f.now)
         .await
         .unwrap();
     assert_eq!(
@@ -524,7 +509,7 @@ async fn departure_cancels_open_games() {
     assert_conflict(
         f.store
             .leave_tournament(
-                Actor::Organiser,
+                Actor::Host,
                 cup.id,
                 &leave(DepartureKind::Disqualified, Some(round(2))),
                 f.now,
@@ -535,7 +520,7 @@ async fn departure_cancels_open_games() {
     let left = f
         .store
         .leave_tournament(
-            Actor::Organiser,
+            Actor::Host,
             cup.id,
             &leave(DepartureKind::Disqualified, None),
             f.now,
@@ -546,7 +531,7 @@ async fn departure_cancels_open_games() {
     assert_conflict(
         f.store
             .leave_tournament(
-                Actor::Organiser,
+                Actor::Host,
                 cup.id,
                 &leave(DepartureKind::Withdrawn, None),
                 f.now,
@@ -585,7 +570,7 @@ async fn departure_cancels_open_games() {
         .await
         .unwrap();
     assert_conflict(
-        f.store.rerun_game(Actor::Organiser, running, f.now).await,
+        f.store.rerun_game(Actor::Host, running, f.now).await,
         &["only a game"],
     );
 }
@@ -608,13 +593,13 @@ async fn rerun_game_does_not_reopen_its_round() {
     let second = drawn(2, &[&[[b, a]], &[[c, b]], &[[a, c]]], &[c, a, b]);
     start(&f, cup.id, &second).await.unwrap();
     f.store
-        .void_game(Actor::Organiser, played, REASON, f.now)
+        .void_game(Actor::Host, played, REASON, f.now)
         .await
         .unwrap();
     let out = departure(c, DepartureKind::Withdrawn, None);
     let left = f
         .store
-        .leave_tournament(Actor::Organiser, cup.id, &out, f.now)
+        .leave_tournament(Actor::Host, cup.id, &out, f.now)
         .await
         .unwrap();
     assert_eq!(
@@ -624,7 +609,7 @@ async fn rerun_game_does_not_reopen_its_round() {
     );
     // The game of B and A in the second round is open, and the voided one of the first round.
     f.store
-        .rerun_game(Actor::Organiser, played, f.now)
+        .rerun_game(Actor::Host, played, f.now)
         .await
         .unwrap();
     for _ in 0..2 {
@@ -632,7 +617,7 @@ async fn rerun_game_does_not_reopen_its_round() {
     }
     assert!(record(&f, cup.id).await.rounds[1].over_at.is_some());
     f.store
-        .close_tournament(Actor::Organiser, cup.id, f.now)
+        .close_tournament(Actor::Host, cup.id, f.now)
         .await
         .unwrap();
 }
@@ -645,7 +630,7 @@ async fn withdrawn_team_plays_the_round_to_its_end() {
     let out = departure(c, DepartureKind::Withdrawn, None);
     let leave = async |request: &DepartureRequest| {
         f.store
-            .leave_tournament(Actor::Organiser, cup.id, request, f.now)
+            .leave_tournament(Actor::Host, cup.id, request, f.now)
             .await
     };
     let early = departure(c, DepartureKind::Withdrawn, Some(round(1)));
@@ -680,13 +665,11 @@ async fn cancelled_game_of_an_earlier_round_is_not_waited_for() {
     let second = drawn(2, &[&[[b, a]], &[[c, b]], &[[a, c]]], &[c, a, b]);
     start(&f, cup.id, &second).await.unwrap();
     f.store
-        .void_game(Actor::Organiser, of_c.id, REASON, f.now)
+        .void_game(Actor::Host, of_c.id, REASON, f.now)
         .await
         .unwrap();
     let out = departure(c, DepartureKind::Disqualified, None);
-    let left = f
-        .store
-        .leave_tournament(Actor::Organiser, cup.id, &out, f.now);
+    let left = f.store.leave_tournament(Actor::Host, cup.id, &out, f.now);
     assert_eq!(left.await.unwrap().unwrap().from_round, round(2));
     assert!(matches!(
         state(&f, of_c.id).await,
@@ -695,7 +678,7 @@ async fn cancelled_game_of_an_earlier_round_is_not_waited_for() {
     run_next_game(&f).await;
     assert!(record(&f, cup.id).await.rounds[1].over_at.is_some());
     f.store
-        .close_tournament(Actor::Organiser, cup.id, f.now)
+        .close_tournament(Actor::Host, cup.id, f.now)
         .await
         .unwrap();
 }
@@ -709,13 +692,13 @@ async fn withdrawal_does_not_delay_a_disqualification() {
         let leave = async |request: &DepartureRequest| {
             let left = f
                 .store
-                .leave_tournament(Actor::Organiser, cup.id, request, f.now);
+                .leave_tournament(Actor::Host, cup.id, request, f.now);
             left.await.unwrap().unwrap()
         };
         assert_eq!(leave(&request).await.from_round, round(2));
         if of_the_season {
-            let ruling = f.store.disqualify_team(Actor::Organiser, c, REASON, f.now);
-            ruling.await.unwrap();
+            let decision = f.store.disqualify_team(Actor::Host, c, REASON, f.now);
+            decision.await.unwrap();
         } else {
             leave(&departure(c, DepartureKind::Disqualified, None)).await;
         }
@@ -748,7 +731,7 @@ async fn disqualification_also_applies_after_withdrawal() {
     }
     let leave = async |request: DepartureRequest| {
         f.store
-            .leave_tournament(Actor::Organiser, cup.id, &request, f.now)
+            .leave_tournament(Actor::Host, cup.id, &request, f.now)
             .await
     };
     let out = leave(departure(c, DepartureKind::Withdrawn, None))
@@ -771,23 +754,21 @@ async fn disqualification_also_applies_after_withdrawal() {
     let games = record(&f, cup.id).await.games;
     for game in &games[..2] {
         f.store
-            .void_game(Actor::Organiser, game.id, REASON, f.now)
+            .void_game(Actor::Host, game.id, REASON, f.now)
             .await
             .unwrap();
     }
     assert_conflict(
-        f.store
-            .rerun_game(Actor::Organiser, games[1].id, f.now)
-            .await,
+        f.store.rerun_game(Actor::Host, games[1].id, f.now).await,
         &["by its round"],
     );
     f.store
-        .rerun_game(Actor::Organiser, games[0].id, f.now)
+        .rerun_game(Actor::Host, games[0].id, f.now)
         .await
         .unwrap();
     // A team disqualified from the season leaves its tournaments.
     f.store
-        .disqualify_team(Actor::Organiser, b, REASON, f.now)
+        .disqualify_team(Actor::Host, b, REASON, f.now)
         .await
         .unwrap();
     assert!(f.claim().await.is_none(), "queued games are cancelled");
@@ -798,7 +779,7 @@ async fn disqualification_also_applies_after_withdrawal() {
         DepartureKind::Disqualified
     );
     assert_conflict(
-        f.store.close_season(Actor::Organiser, f.now).await,
+        f.store.close_season(Actor::Host, f.now).await,
         &["Cup", "close it first"],
     );
 }
@@ -815,12 +796,12 @@ async fn friendly_games_have_a_quota_and_wait_for_rounds() {
     let [a, b, base] = teams[..] else { panic!() };
     let out = departure(base, DepartureKind::Withdrawn, None);
     f.store
-        .leave_tournament(Actor::Organiser, cup.id, &out, f.now)
+        .leave_tournament(Actor::Host, cup.id, &out, f.now)
         .await
         .unwrap();
     let test = async |f: &TestStore, by| {
         f.store
-            .request_test_game(Actor::Organiser, cup.id, a, by, f.now)
+            .request_test_game(Actor::Host, cup.id, a, by, f.now)
             .await
     };
     assert_conflict(test(&f, None).await, &["has no baseline"]);
@@ -835,7 +816,7 @@ async fn friendly_games_have_a_quota_and_wait_for_rounds() {
         ..TournamentChange::default()
     };
     f.store
-        .change_tournament(Actor::Organiser, cup.id, &change, f.now)
+        .change_tournament(Actor::Host, cup.id, &change, f.now)
         .await
         .unwrap();
     let friendly = async |f: &TestStore, by, with| {
@@ -891,7 +872,7 @@ async fn friendly_games_have_a_quota_and_wait_for_rounds() {
     assert_eq!(record.games.len(), 1);
     let of_round = f
         .store
-        .cancel_game(Actor::Organiser, record.games[0].id, "no", f.now)
+        .cancel_game(Actor::Host, record.games[0].id, "no", f.now)
         .await;
     assert_conflict(of_round, &["cannot be cancelled"]);
 }
@@ -906,7 +887,7 @@ async fn schedule_replays_have_new_seeds_and_do_not_count() {
     let (cup, teams) = opened(&f, &["A", "B"], once).await;
     let replay = async |times| {
         f.store
-            .request_replays(Actor::Organiser, cup.id, times, f.now)
+            .request_schedule_replays(Actor::Host, cup.id, times, f.now)
             .await
     };
     assert_conflict(replay(1).await, &["0 of 1 rounds have started"]);
@@ -919,13 +900,10 @@ async fn schedule_replays_have_new_seeds_and_do_not_count() {
     assert_eq!(replay(3).await.unwrap(), 3);
     assert_conflict(replay(998).await, &["expected 1 to 997"]);
     f.store
-        .void_game(Actor::Organiser, game, REASON, f.now)
+        .void_game(Actor::Host, game, REASON, f.now)
         .await
         .unwrap();
-    f.store
-        .rerun_game(Actor::Organiser, game, f.now)
-        .await
-        .unwrap();
+    f.store.rerun_game(Actor::Host, game, f.now).await.unwrap();
     let (claim, counts, _) = claim_game(&f).await;
     assert!(matches!(
         f.store.game(counts).await.unwrap().purpose,
@@ -946,12 +924,16 @@ async fn schedule_replays_have_new_seeds_and_do_not_count() {
         .unwrap();
     assert_eq!(
         f.store
-            .cancel_replays(Actor::Organiser, cup.id, f.now)
+            .cancel_schedule_replays(Actor::Host, cup.id, f.now)
             .await
             .unwrap(),
         2
     );
-    let replays = f.store.games(cup.id, GameFilter::Replays).await.unwrap();
+    let replays = f
+        .store
+        .games(cup.id, GameFilter::ScheduleReplays)
+        .await
+        .unwrap();
     assert_eq!(replays[0].id, replayed);
     let of_rounds = record(&f, cup.id).await.games;
     assert!(
@@ -1000,7 +982,7 @@ async fn closed_tournament_is_final_and_frees_bundles() {
     };
     let change = async || {
         f.store
-            .change_tournament(Actor::Organiser, cup.id, &rules, f.now)
+            .change_tournament(Actor::Host, cup.id, &rules, f.now)
             .await
     };
     assert_eq!(change().await.unwrap().rules.steps, 500);
@@ -1013,18 +995,16 @@ async fn closed_tournament_is_final_and_frees_bundles() {
     };
     assert_conflict(
         f.store
-            .change_tournament(Actor::Organiser, cup.id, &other, f.now)
+            .change_tournament(Actor::Host, cup.id, &other, f.now)
             .await,
         &["a round has started"],
     );
     assert_conflict(
-        f.store
-            .close_tournament(Actor::Organiser, cup.id, f.now)
-            .await,
+        f.store.close_tournament(Actor::Host, cup.id, f.now).await,
         &["1 games are queued or running"],
     );
     assert_conflict(
-        f.store.close_season(Actor::Organiser, f.now).await,
+        f.store.close_season(Actor::Host, f.now).await,
         &["1 games are queued"],
     );
     let game = run_next_game(&f).await;
@@ -1038,15 +1018,13 @@ async fn closed_tournament_is_final_and_frees_bundles() {
         &["a tournament that is not closed"],
     );
     f.store
-        .close_tournament(Actor::Organiser, cup.id, f.now)
+        .close_tournament(Actor::Host, cup.id, f.now)
         .await
         .unwrap();
     f.store.check_deletable(of_a, f.now).await.unwrap();
     assert_conflict(change().await, &["was closed on"]);
     assert_conflict(
-        f.store
-            .void_game(Actor::Organiser, game, REASON, f.now)
-            .await,
+        f.store.void_game(Actor::Host, game, REASON, f.now).await,
         &["was closed on"],
     );
     let twice = NewTournament {
@@ -1056,10 +1034,7 @@ async fn closed_tournament_is_final_and_frees_bundles() {
         settings: TournamentSettings::default(),
         entrants: Vec::new(),
     };
-    let taken = f
-        .store
-        .open_tournament(Actor::Organiser, &twice, f.now)
-        .await;
+    let taken = f.store.open_tournament(Actor::Host, &twice, f.now).await;
     assert!(
         matches!(taken, Err(StoreError::TournamentNameTaken(_))),
         "{taken:?}"
@@ -1135,7 +1110,7 @@ async fn run_actions(actions: Vec<Action>) {
     for game in record(&f, cup.id).await.games {
         if let GameState::PlatformFailed { .. } = game.state {
             f.store
-                .rerun_game(Actor::Organiser, game.id, f.now)
+                .rerun_game(Actor::Host, game.id, f.now)
                 .await
                 .unwrap();
         }

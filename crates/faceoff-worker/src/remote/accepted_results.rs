@@ -112,12 +112,12 @@ impl Dispatcher {
     ) -> anyhow::Result<()> {
         let interval = Duration::from_secs(self.server.lease_s.into()) / 3;
         while !shutdown.is_cancelled() {
-            let mut overdue = self.pending_results.overdue(Instant::now());
+            let mut due_for_renewal = self.pending_results.due_for_renewal(Instant::now());
             for PendingResult {
                 lease,
                 episodes_done,
                 ..
-            } in overdue.clone()
+            } in due_for_renewal.clone()
             {
                 let (server, nonce) = (self.server.clone(), lease.nonce);
                 let renewed =
@@ -127,15 +127,15 @@ impl Dispatcher {
                 }
             }
             // NATS loses results in order, so checking the oldest ones suffices.
-            overdue.sort_by_key(|result| result.since);
-            overdue.truncate(MAX_LOOKUPS);
+            due_for_renewal.sort_by_key(|result| result.since);
+            due_for_renewal.truncate(MAX_LOOKUPS);
             for PendingResult {
                 lease, sequence, ..
-            } in overdue
+            } in due_for_renewal
             {
                 let is_stored = self.streams.has_result(&lease, sequence).await?;
                 // A result that is being processed, or was accepted meanwhile, is not lost.
-                if is_stored || self.pending_results.is_processed(lease.nonce) {
+                if is_stored || self.pending_results.is_processing_or_processed(lease.nonce) {
                     continue;
                 }
                 self.pending_results.remove(lease.nonce);

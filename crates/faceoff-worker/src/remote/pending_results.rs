@@ -69,15 +69,15 @@ impl PendingResults {
     }
 
     /// Is the result being processed, or was it processed?
-    pub(super) fn is_processed(&self, nonce: Uuid) -> bool {
+    pub(super) fn is_processing_or_processed(&self, nonce: Uuid) -> bool {
         self.processing().contains(&nonce) || !self.pending().contains_key(&nonce)
     }
 
     /// The results that have been pending for [`RENEW_AFTER`] or longer.
-    pub(super) fn overdue(&self, now: Instant) -> Vec<PendingResult> {
+    pub(super) fn due_for_renewal(&self, now: Instant) -> Vec<PendingResult> {
         let pending = self.pending();
-        let is_overdue = |result: &&PendingResult| now.duration_since(result.since) >= RENEW_AFTER;
-        pending.values().filter(is_overdue).cloned().collect()
+        let is_due = |result: &&PendingResult| now.duration_since(result.since) >= RENEW_AFTER;
+        pending.values().filter(is_due).cloned().collect()
     }
 
     /// A panic while the lock is held leaves every entry intact.
@@ -111,26 +111,44 @@ mod tests {
         };
         results.add(lease(1), EPISODES_DONE, 7, start);
         results.add(lease(2), EPISODES_DONE, 8, start + Duration::from_secs(1));
-        assert!(results.overdue(start + Duration::from_secs(1)).is_empty());
-        let overdue = results.overdue(start + RENEW_AFTER);
-        assert_eq!(overdue.len(), 1);
+        assert!(
+            results
+                .due_for_renewal(start + Duration::from_secs(1))
+                .is_empty()
+        );
+        let due_for_renewal = results.due_for_renewal(start + RENEW_AFTER);
+        assert_eq!(due_for_renewal.len(), 1);
         assert_eq!(
             (
-                overdue[0].lease.nonce,
-                overdue[0].episodes_done,
-                overdue[0].sequence
+                due_for_renewal[0].lease.nonce,
+                due_for_renewal[0].episodes_done,
+                due_for_renewal[0].sequence
             ),
             (Uuid::from_u128(1), EPISODES_DONE, 7)
         );
         let nonce = Uuid::from_u128(1);
-        assert!(!results.is_processed(nonce));
+        assert!(!results.is_processing_or_processed(nonce));
         let guard = results.start_processing(nonce);
-        assert!(results.is_processed(nonce), "the result is being processed");
+        assert!(
+            results.is_processing_or_processed(nonce),
+            "the result is being processed"
+        );
         drop(guard);
-        assert!(!results.is_processed(nonce), "the result is pending again");
+        assert!(
+            !results.is_processing_or_processed(nonce),
+            "the result is pending again"
+        );
         results.remove(nonce);
-        assert!(results.is_processed(nonce), "the result was processed");
+        assert!(
+            results.is_processing_or_processed(nonce),
+            "the result was processed"
+        );
         results.remove(Uuid::from_u128(3));
-        assert_eq!(results.overdue(start + Duration::from_secs(60)).len(), 1);
+        assert_eq!(
+            results
+                .due_for_renewal(start + Duration::from_secs(60))
+                .len(),
+            1
+        );
     }
 }

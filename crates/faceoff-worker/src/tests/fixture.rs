@@ -136,12 +136,12 @@ fn clips(spec: &ShardSpec) -> Vec<u8> {
             steps: 10,
             success: spec.profile == IDEAL || episode != 1,
             end: EpisodeEnd::HORIZON,
-            why: text,
+            end_description: text,
             start: Some([0.0; 4]),
             last: Some([0.0; 4]),
-            broken: Vec::new(),
+            violations: Vec::new(),
             longest_s: Some(0.001),
-            late: 0,
+            late_answers: 0,
         });
     }
     pack.add_index(&index).unwrap();
@@ -387,7 +387,7 @@ impl Server {
         let stage = configure_stage(&self.store, &plan, None, self.now()).await;
         let started = self
             .store
-            .start_day(Actor::Organiser, stage, self.now())
+            .start_day(Actor::Host, stage, self.now())
             .await
             .unwrap();
         assert_eq!(started[0].submission, submission.id);

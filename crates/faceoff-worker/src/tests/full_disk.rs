@@ -34,7 +34,7 @@ async fn full_disk_does_not_count_as_an_attempt() {
     assert_eq!(evaluator.played.lock().unwrap().len(), 6);
     running.stop().await;
     let events = server.store.events_after(0, 1000).await.unwrap();
-    let is_counted = |record: &EventRecord| matches!(record.event, Event::UnitGivenBack { .. });
+    let is_counted = |record: &EventRecord| matches!(record.event, Event::JobReturned { .. });
     assert!(!events.iter().any(is_counted), "{events:#?}");
 }
 

@@ -85,7 +85,7 @@ impl Client {
     }
 
     /// Organiser: signs off a stage's result; `confirm` is the stage's name.
-    pub async fn finalise(
+    pub async fn sign_off_stage(
         &self,
         id: StageId,
         confirm: Option<String>,

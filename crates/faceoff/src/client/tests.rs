@@ -21,7 +21,7 @@ use indicatif::ProgressBar;
 use jiff::Timestamp;
 use tempfile::TempDir;
 
-/// The organiser's token.
+/// The host's token, which has an organiser's rights.
 const ADMIN: &str = "fo_admin_test";
 /// The bundle limit of servers on which nothing is uploaded, or only a bundle that is too large.
 const SMALL_BUNDLE_BYTES: u64 = 64;
@@ -156,11 +156,11 @@ async fn submission_passes_from_upload_to_evaluation() {
     );
 
     let day = site.organiser.start_day(None).await.unwrap();
-    assert_eq!(day.created.len(), 1);
-    assert_eq!(day.created[0].progress.episodes_total, 1);
+    assert_eq!(day.evaluations.len(), 1);
+    assert_eq!(day.evaluations[0].progress.episodes_total, 1);
     let listed = site.organiser.evaluations(Some(day.day)).await.unwrap();
-    assert_eq!(listed, day.created);
-    let id = day.created[0].id;
+    assert_eq!(listed, day.evaluations);
+    let id = day.evaluations[0].id;
     assert_eq!(
         client.evaluation(id).await.unwrap().status,
         EvaluationStatus::Queued

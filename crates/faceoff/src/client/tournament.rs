@@ -4,8 +4,8 @@
 use super::Client;
 use faceoff_api::{
     requests::{
-        Confirmation, Decision, GamesQuery, NewDeparture, NewEntrants, NewFriendlyGame, NewReplays,
-        NewTestGames, NewTournament, Reason, TournamentChange,
+        Confirmation, Decision, GamesQuery, NewDeparture, NewEntrants, NewFriendlyGame,
+        NewScheduleReplays, NewTestGames, NewTournament, Reason, TournamentChange,
     },
     views::{
         champion_shares::ChampionSharesView,
@@ -151,17 +151,20 @@ impl Client {
     }
 
     /// Organiser: requests replays of the whole schedule.
-    pub async fn request_replays(
+    pub async fn request_schedule_replays(
         &self,
         id: TournamentId,
         times: u32,
     ) -> anyhow::Result<ChampionSharesView> {
         let path = tournament_path(id, "/replays");
-        self.post(&path, &NewReplays { times }).await
+        self.post(&path, &NewScheduleReplays { times }).await
     }
 
     /// Organiser: cancels the unfinished replays.
-    pub async fn cancel_replays(&self, id: TournamentId) -> anyhow::Result<ChampionSharesView> {
+    pub async fn cancel_schedule_replays(
+        &self,
+        id: TournamentId,
+    ) -> anyhow::Result<ChampionSharesView> {
         self.call(Method::DELETE, &tournament_path(id, "/replays"))
             .await
     }

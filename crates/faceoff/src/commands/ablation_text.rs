@@ -9,7 +9,7 @@ pub(super) fn ablation_text(view: &AblationView) -> String {
         view.submission, view.episodes_per_task
     )];
     match &view.status {
-        AblationStatus::Open { progress } => lines.push(format!(
+        AblationStatus::Unfinished { progress } => lines.push(format!(
             "{} of {} episodes finished",
             progress.episodes_done, progress.episodes_total
         )),

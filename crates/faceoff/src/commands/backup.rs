@@ -69,7 +69,7 @@ impl BackupCommand {
             if manifest.missing.is_empty() {
                 text.push_str(&format!(
                     "\nchecked: the database is intact, and all files it refers to are unchanged\n\
-                    to restore it: faceoff restore {} --data FOLDER",
+                    to restore it: faceoff restore {} --data-dir FOLDER",
                     self.folder.display()
                 ));
             }

@@ -143,12 +143,12 @@ impl DemoCommand {
         ));
         let day = organiser.start_day(None).await?;
         ensure!(
-            day.created.len() == teams.len(),
+            day.evaluations.len() == teams.len(),
             "expected an evaluation per team, got {} for {} teams",
-            day.created.len(),
+            day.evaluations.len(),
             teams.len()
         );
-        let evaluations = wait_for_evaluations(&organiser, &day.created).await?;
+        let evaluations = wait_for_evaluations(&organiser, &day.evaluations).await?;
 
         progress.step(format_args!("4. the board\n"));
         let board = organiser.board(None, &BoardQuery::default()).await?;
@@ -366,7 +366,7 @@ async fn wait_for_validation(
                 let log = log.unwrap_or_default();
                 bail!("{} is not valid: {reason}\n{log}", submission.file_name)
             }
-            SubmissionStatus::ValidationError { reason } => {
+            SubmissionStatus::PlatformFailed { reason } => {
                 bail!("{} could not be validated: {reason}", submission.file_name)
             }
         }

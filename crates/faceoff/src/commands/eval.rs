@@ -191,7 +191,7 @@ impl EvalCommand {
         }
         for (_, mismatch_seed) in &seeds {
             config
-                .check_playable(*mismatch_seed)
+                .check_season_magnitudes(*mismatch_seed)
                 .context("the configuration")?;
         }
         let (first, mismatch_seed) = &seeds[0];

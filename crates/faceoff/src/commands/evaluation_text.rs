@@ -10,8 +10,8 @@ use faceoff_types::{TaskMap, Tier};
 
 /// Status of an evaluation in a few words.
 pub(super) fn status_text(evaluation: &EvaluationView) -> String {
-    if let Some(ruling) = &evaluation.voided {
-        return format!("voided: {}", ruling.reason);
+    if let Some(decision) = &evaluation.voided {
+        return format!("voided: {}", decision.reason);
     }
     let progress = evaluation.progress;
     let position = match &evaluation.queue {
@@ -26,7 +26,7 @@ pub(super) fn status_text(evaluation: &EvaluationView) -> String {
                 progress.episodes_done, progress.episodes_total
             )
         }
-        EvaluationStatus::Finalising => "computing the score".to_owned(),
+        EvaluationStatus::Scoring => "computing the score".to_owned(),
         EvaluationStatus::Finished { result: None, .. } => "finished".to_owned(),
         EvaluationStatus::Finished {
             result: Some(result),
@@ -39,7 +39,7 @@ pub(super) fn status_text(evaluation: &EvaluationView) -> String {
         ),
         EvaluationStatus::AgentFailed { .. } => "the agent failed".to_owned(),
         EvaluationStatus::PlatformFailed { reason, .. } => format!("platform fault: {reason}"),
-        EvaluationStatus::NotPlayed { reason, .. } => format!("not evaluated: {reason}"),
+        EvaluationStatus::DeadlineMissed { reason, .. } => format!("not evaluated: {reason}"),
         EvaluationStatus::Cancelled { reason, .. } => format!("cancelled: {reason}"),
     }
 }

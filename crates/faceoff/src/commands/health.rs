@@ -46,9 +46,9 @@ fn as_unhealthy(error: anyhow::Error) -> anyhow::Error {
 }
 
 fn health_text(health: &HealthView) -> String {
-    let pause = health.paused.as_ref().map(|ruling| {
-        let since = time_text(ruling.at);
-        format!("\nthe queue is paused since {since}: {}", ruling.reason)
+    let pause = health.paused.as_ref().map(|decision| {
+        let since = time_text(decision.at);
+        format!("\nthe queue is paused since {since}: {}", decision.reason)
     });
     format!(
         "{}, version {}; jobs: {} running, {} pending{}",

@@ -129,7 +129,7 @@ fn submission_log(id: &str, status: &SubmissionStatus, next: String) -> anyhow::
         SubmissionStatus::Validating => (None, None),
         SubmissionStatus::Valid { log } => (None, log.clone()),
         SubmissionStatus::Invalid { reason, log } => (Some(reason.clone()), log.clone()),
-        SubmissionStatus::ValidationError { reason } => (Some(reason.clone()), None),
+        SubmissionStatus::PlatformFailed { reason } => (Some(reason.clone()), None),
     };
     Ok(Log {
         kind: "submission",
@@ -149,11 +149,11 @@ fn evaluation_log(id: &str, status: EvaluationStatus, next: String) -> anyhow::R
             (None, faults.unwrap_or_default(), log)
         }
         EvaluationStatus::PlatformFailed { reason, .. }
-        | EvaluationStatus::NotPlayed { reason, .. }
+        | EvaluationStatus::DeadlineMissed { reason, .. }
         | EvaluationStatus::Cancelled { reason, .. } => (Some(reason), Vec::new(), None),
         EvaluationStatus::Queued
         | EvaluationStatus::Running
-        | EvaluationStatus::Finalising
+        | EvaluationStatus::Scoring
         | EvaluationStatus::Finished { .. } => (None, Vec::new(), None),
     };
     Ok(Log {

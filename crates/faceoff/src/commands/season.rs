@@ -49,9 +49,9 @@ pub(super) fn season_text(season: &SeasonView) -> String {
         None => String::new(),
     };
     let queue = match &season.paused {
-        Some(ruling) => {
-            let since = time_text(ruling.at);
-            format!("\npaused     since {since}: {}", ruling.reason)
+        Some(decision) => {
+            let since = time_text(decision.at);
+            format!("\npaused     since {since}: {}", decision.reason)
         }
         None => String::new(),
     };

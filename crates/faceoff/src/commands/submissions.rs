@@ -236,7 +236,7 @@ pub(super) fn submission_line(submission: &SubmissionView) -> String {
         },
         SubmissionStatus::Valid { .. } => "valid".to_owned(),
         SubmissionStatus::Invalid { reason, .. } => format!("invalid: {reason}"),
-        SubmissionStatus::ValidationError { reason } => {
+        SubmissionStatus::PlatformFailed { reason } => {
             format!("validation failed by a platform fault: {reason}")
         }
     };

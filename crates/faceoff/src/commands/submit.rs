@@ -88,7 +88,7 @@ impl SubmitCommand {
         match submission.status {
             SubmissionStatus::Valid { .. } => Ok(()),
             SubmissionStatus::Invalid { reason, .. } => bail!("invalid: {reason}"),
-            SubmissionStatus::ValidationError { reason } => {
+            SubmissionStatus::PlatformFailed { reason } => {
                 bail!(
                     "the validation failed by a platform fault ({reason}); submit the bundle again"
                 )
@@ -114,7 +114,7 @@ async fn print_validation(client: &Client, submission: &SubmissionView) -> anyho
             }
         }
         SubmissionStatus::Invalid { log, .. } => print_log(log.as_deref()),
-        SubmissionStatus::ValidationError { .. } | SubmissionStatus::Validating => {}
+        SubmissionStatus::PlatformFailed { .. } | SubmissionStatus::Validating => {}
     }
     Ok(())
 }

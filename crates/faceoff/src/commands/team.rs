@@ -252,7 +252,7 @@ pub(super) fn team_text(team: &TeamView) -> String {
             "disqualified",
             team.disqualified
                 .as_ref()
-                .map(|ruling| ruling.reason.clone()),
+                .map(|decision| decision.reason.clone()),
         ),
     ] {
         lines.extend(text.map(|text| format!("{label:<13}{text}")));

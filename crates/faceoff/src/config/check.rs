@@ -62,10 +62,10 @@ impl Config {
     }
 
     /// Refuses perturbations with which a season with this seed cannot be played.
-    pub fn check_playable(&self, mismatch_seed: Seed) -> anyhow::Result<()> {
+    pub fn check_season_magnitudes(&self, mismatch_seed: Seed) -> anyhow::Result<()> {
         let magnitudes = self.rules().variation.perturbations;
         simulator()
-            .check_playable(&magnitudes, mismatch_seed)
+            .check_season_magnitudes(&magnitudes, mismatch_seed)
             .map_err(|problem| anyhow!("evaluation.perturbations.{problem}"))
     }
 

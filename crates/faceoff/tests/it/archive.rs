@@ -27,7 +27,7 @@ use std::{
 };
 use tempfile::TempDir;
 
-/// The organiser's token.
+/// The host's token, which has an organiser's rights.
 const ADMIN: &str = "fo_admin_test";
 /// How long a claimed job is leased.
 const LEASE_SECONDS: u32 = 60;
@@ -157,10 +157,7 @@ async fn run_day(store: &Store) -> EvaluationId {
                     .await
                     .unwrap();
                 let stage = stage.take().unwrap();
-                store
-                    .start_day(Actor::Organiser, stage, now())
-                    .await
-                    .unwrap();
+                store.start_day(Actor::Host, stage, now()).await.unwrap();
             }
             Job::Shard { run, shard, .. } => {
                 let outcomes =

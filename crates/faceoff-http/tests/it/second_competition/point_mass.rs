@@ -116,7 +116,7 @@ impl Simulator for PointMass {
         "point mass 1"
     }
 
-    fn env(&self, agent_task: AgentTask) -> Result<String, UnknownTask> {
+    fn hello_env(&self, agent_task: AgentTask) -> Result<String, UnknownTask> {
         self.competition.find_task(agent_task.name().as_str())?;
         Ok(format!(r#"{{"step_s":{STEP_S}}}"#))
     }

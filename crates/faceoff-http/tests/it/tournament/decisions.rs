@@ -199,7 +199,7 @@ async fn voided_game_is_rerun_on_the_same_seed() {
     cup.commit(&claim, &game, seed, GameOutcome::goals(5, 0))
         .await;
     let path = format!("/api/v1/games/{}", game.id);
-    let ruling = json!({ "reason": "a fan stood still" });
+    let decision = json!({ "reason": "a fan stood still" });
     let post = async |action: &str, body: &Value| {
         cup.site
             .post(&format!("{path}/{action}"), Some(ADMIN), body)
@@ -210,9 +210,10 @@ async fn voided_game_is_rerun_on_the_same_seed() {
         .problem(409, "conflict", &["voided"]);
     let [home, away] = cup.names(&game).await;
     let name = format!("{home} - {away}");
-    let problem = post("void", &ruling)
-        .await
-        .problem(409, "not-confirmed", &[&name, "same seed"]);
+    let problem =
+        post("void", &decision)
+            .await
+            .problem(409, "not-confirmed", &[&name, "same seed"]);
     assert_eq!(problem["confirm"], json!(name));
     let confirmed = json!({ "reason": "a fan stood still", "confirm": name });
     let voided = post("void", &confirmed).await.json(200);
@@ -416,7 +417,7 @@ async fn tournament_keeps_its_ruleset_until_its_rules_change() {
     };
     let now = cup.site.now();
     store
-        .change_tournament(Actor::Organiser, opened.id, &earlier_ruleset, now)
+        .change_tournament(Actor::Host, opened.id, &earlier_ruleset, now)
         .await
         .unwrap();
     for rules in [

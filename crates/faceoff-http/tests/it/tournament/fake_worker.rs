@@ -132,7 +132,7 @@ pub async fn commit(
 ) {
     let team_names = names(site, game).await;
     let recording = match game.purpose {
-        GamePurpose::Replay { .. } => None,
+        GamePurpose::ScheduleReplay { .. } => None,
         _ => Some(store_files(site, claim, game).await),
     };
     let commit = GameCommit {

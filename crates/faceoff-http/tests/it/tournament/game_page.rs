@@ -10,7 +10,7 @@ use crate::{
     site::{ADMIN, string},
 };
 use faceoff_airhockey::Interpolation;
-use faceoff_airhockey::{RallyEntry, Response, RunningGame, SimulationSetup};
+use faceoff_airhockey::{RallyReadiness, Response, RunningGame, SimulationSetup};
 use faceoff_episode::AnswerTiming;
 use faceoff_replay::{CHUNK_STEPS, Clip, GameClipRecorder};
 use faceoff_store::Game;
@@ -31,12 +31,12 @@ fn record_game_clips() -> Vec<u8> {
     let clips = GameClipRecorder::new(Vec::new()).unwrap();
     let mut running = RunningGame::begin(&setup, STEPS, GameLimits::default(), clips);
     while running.end().is_none() {
-        let entries = Side::BOTH.map(|side| RallyEntry::Ready {
+        let readiness = Side::BOTH.map(|side| RallyReadiness::Ready {
             startup_s: running.needs_start(side).then_some(0.1),
             interpolation: Interpolation::Linear,
             reset_s: 0.1,
         });
-        running.start_rally(entries).unwrap();
+        running.start_rally(readiness).unwrap();
         while running.is_in_rally() {
             let actions = Side::BOTH.map(|side| {
                 let question = running.question(side).unwrap().unwrap();

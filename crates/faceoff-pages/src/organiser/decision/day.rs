@@ -5,7 +5,7 @@ use faceoff_api::requests;
 use faceoff_service::{
     app::AppState,
     problem::Problem,
-    services::{evaluations, rulings},
+    services::{evaluations, organiser_decisions},
     views::capacity,
 };
 use faceoff_store::Actor;
@@ -22,7 +22,7 @@ impl DayDecision {
     pub(super) async fn preview(self, app: &AppState) -> Result<DecisionPreview, Problem> {
         match self {
             Self::Void(day) => {
-                let effects = rulings::preview_void_day(app, day, None).await?;
+                let effects = organiser_decisions::preview_void_day(app, day, None).await?;
                 Ok(DecisionPreview {
                     title: format!("Void the evaluation day {}", day.date),
                     reason_readers: Some(PUBLIC_REASON),
@@ -84,7 +84,7 @@ impl DayDecision {
                 ("missed", day)
             }
             Self::Void(day) => {
-                rulings::void_day(app, actor, day, &request).await?;
+                organiser_decisions::void_day(app, actor, day, &request).await?;
                 ("day-voided", day)
             }
         };

@@ -8,7 +8,7 @@ use faceoff_api::{
 use faceoff_service::{
     app::AppState,
     problem::Problem,
-    services::{evaluations, rulings},
+    services::{evaluations, organiser_decisions},
     views::{evaluation, visibility::Visibility},
 };
 use faceoff_store::Actor;
@@ -41,7 +41,7 @@ impl EvaluationDecision {
         match self {
             Self::Void(id) => {
                 let view = evaluation(app, id).await?;
-                let effects = rulings::preview_void_evaluation(app, id, None).await?;
+                let effects = organiser_decisions::preview_void_evaluation(app, id, None).await?;
                 Ok(DecisionPreview {
                     title: format!("Void the evaluation of {} by {}", view.day, view.team_name),
                     reason_readers: Some(PUBLIC_REASON),
@@ -112,7 +112,7 @@ impl EvaluationDecision {
         let (notice, evaluation) = match self {
             Self::Void(id) => (
                 "voided",
-                rulings::void_evaluation(app, actor, id, &request).await?,
+                organiser_decisions::void_evaluation(app, actor, id, &request).await?,
             ),
             Self::Cancel(id) => (
                 "cancelled",

@@ -3,7 +3,9 @@
 use super::preview::{DecisionPreview, Done, PUBLIC_REASON};
 use crate::figures::utc_minute;
 use faceoff_api::requests;
-use faceoff_service::{app::AppState, problem::Problem, services::rulings, views::ruling};
+use faceoff_service::{
+    app::AppState, problem::Problem, services::organiser_decisions, views::decision,
+};
 use faceoff_store::Actor;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,7 +19,7 @@ const QUEUE_PATH: &str = "/organiser/day";
 
 impl QueueDecision {
     pub(super) async fn preview(self, app: &AppState) -> Result<DecisionPreview, Problem> {
-        let paused = app.store.season().await?.paused.map(ruling::view);
+        let paused = app.store.season().await?.queue_pause.map(decision::view);
         if self == Self::Pause {
             return Ok(DecisionPreview {
                 title: "Pause the queue".to_owned(),
@@ -31,11 +33,11 @@ impl QueueDecision {
         }
         let since = paused.map_or_else(
             || "The queue is not paused.".to_owned(),
-            |ruling| {
+            |decision| {
                 format!(
                     "The queue has been paused since {} ({}).",
-                    utc_minute(ruling.at),
-                    ruling.reason
+                    utc_minute(decision.at),
+                    decision.reason
                 )
             },
         );
@@ -56,11 +58,11 @@ impl QueueDecision {
         let reason = request.reason.as_str();
         let notice = match self {
             Self::Pause => {
-                rulings::pause_queue(app, actor, reason).await?;
+                organiser_decisions::pause_queue(app, actor, reason).await?;
                 "paused"
             }
             Self::Resume => {
-                rulings::resume_queue(app, actor).await?;
+                organiser_decisions::resume_queue(app, actor).await?;
                 "resumed"
             }
         };

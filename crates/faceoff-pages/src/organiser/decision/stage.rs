@@ -85,7 +85,7 @@ impl StageDecision {
             }
             Self::SignOff(id) => {
                 let confirm = request.confirm.as_deref();
-                stage_results::finalise_stage(app, actor, id, confirm).await?;
+                stage_results::sign_off_stage(app, actor, id, confirm).await?;
                 "signed-off"
             }
         };

@@ -6,7 +6,7 @@ use faceoff_service::{
     app::AppState,
     auth::Organiser,
     problem::Problem,
-    services::{registrations, rulings},
+    services::{organiser_decisions, registrations},
 };
 use faceoff_types::{RegistrationId, TeamId};
 
@@ -25,7 +25,7 @@ impl TeamDecision {
     pub(super) async fn preview(self, app: &AppState) -> Result<DecisionPreview, Problem> {
         match self {
             Self::Disqualify(id) => {
-                let effects = rulings::preview_disqualification(app, id, None).await?;
+                let effects = organiser_decisions::preview_disqualification(app, id, None).await?;
                 Ok(DecisionPreview {
                     title: format!("Disqualify {}", effects.name),
                     reason_readers: Some(PUBLIC_REASON),
@@ -86,11 +86,11 @@ impl TeamDecision {
         let reason = request.reason.as_str();
         let notice = match self {
             Self::Disqualify(id) => {
-                rulings::disqualify_team(app, actor, id, &request).await?;
+                organiser_decisions::disqualify_team(app, actor, id, &request).await?;
                 "disqualified"
             }
             Self::Reinstate(id) => {
-                rulings::reinstate_team(app, actor, id, reason).await?;
+                organiser_decisions::reinstate_team(app, actor, id, reason).await?;
                 "reinstated"
             }
             Self::Approve(id) => {

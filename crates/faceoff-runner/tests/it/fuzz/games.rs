@@ -6,7 +6,7 @@ use super::{
     fuzz,
 };
 use faceoff_airhockey::EVALUATION;
-use faceoff_airhockey::{RallyEntry, Response, RunningGame, SideFault, SimulationSetup};
+use faceoff_airhockey::{RallyReadiness, Response, RunningGame, SideFault, SimulationSetup};
 use faceoff_dataset::{
     game::{GAME_FILE, GameRecorder, GameRecording, RecordedGame, verify_game},
     verify::VerifyError,
@@ -40,12 +40,12 @@ fn record_game(out: &Path) {
     let recorder = GameRecorder::create(&out.join("tables")).unwrap();
     let mut game = RunningGame::begin(&setup, spec.steps, spec.limits.clone(), recorder);
     while game.end().is_none() {
-        let entries = Side::BOTH.map(|side| RallyEntry::Ready {
+        let readiness = Side::BOTH.map(|side| RallyReadiness::Ready {
             startup_s: game.needs_start(side).then_some(0.25),
             interpolation: Interpolation::Linear,
             reset_s: 0.125,
         });
-        game.start_rally(entries).unwrap();
+        game.start_rally(readiness).unwrap();
         while game.is_in_rally() {
             let step = game.rally_steps();
             let actions = Side::BOTH.map(|side| {

@@ -2,7 +2,7 @@
 //! same seed and swapped sides). The ratings are fitted again to many samples of the units, drawn with replacement.
 
 use super::{bradley_terry::Model, pools::pool_numbers, trial_counts::TrialCounts};
-use crate::draws::Draws;
+use crate::random_numbers::RandomNumbers;
 
 /// Bootstrap samples for the intervals of a pool (the submissions that games connect).
 pub const RESAMPLES: u32 = 1000;
@@ -45,12 +45,12 @@ impl Samples {
         }
         units.sort_unstable();
         let count = u32::try_from(units.len()).expect("a file of games is far shorter");
-        let mut draws = Draws::new(key(&units).finalize_xof());
+        let mut random_numbers = RandomNumbers::new(key(&units).finalize_xof());
         let mut drawn = Vec::new();
         for _ in 0..RESAMPLES {
             drawn.clear();
             for _ in 0..count {
-                drawn.extend(&units[draws.below(count)]);
+                drawn.extend(&units[random_numbers.below(count)]);
             }
             let pool_numbers = pool_numbers(submissions, drawn.iter().copied());
             if pool_numbers.iter().any(|pool| *pool != 0) {

@@ -9,7 +9,7 @@ use super::{
     swiss::{byes, swiss},
     tables::{self, Table},
 };
-use crate::{draws::Draws, tournament::bye::Bye};
+use crate::{random_numbers::RandomNumbers, tournament::bye::Bye};
 use faceoff_types::{Seed, TeamName, TournamentFormat};
 
 /// The schedule of a tournament format.
@@ -53,23 +53,24 @@ impl Schedule for TournamentFormat {
         if active.len() < 2 {
             return Err(ScheduleError::TooFew(active.len()));
         }
-        let mut draws = Draws::from_seed(&seed.derive("schedule", &number.get().to_le_bytes()));
+        let mut random_numbers =
+            RandomNumbers::from_seed(&seed.derive("schedule", &number.get().to_le_bytes()));
         let pairing_counts = progress.pairing_counts();
         let mut groups = Vec::new();
         let matchdays = match self {
             Self::RoundRobin { .. } => {
                 let mut teams = active;
-                draws.shuffle(&mut teams);
+                random_numbers.shuffle(&mut teams);
                 round_robin(&teams, &pairing_counts)
             }
-            Self::Swiss { .. } => vec![swiss(progress, &mut draws)],
+            Self::Swiss { .. } => vec![swiss(progress, &mut random_numbers)],
             Self::Groups {
                 groups: count,
                 advance,
             } => match progress.rounds.first() {
                 None => {
                     let count = check_groups(active.len(), *count, *advance)?;
-                    groups = draw_groups(active, count, &mut draws);
+                    groups = draw_groups(active, count, &mut random_numbers);
                     group_matchdays(&groups, &pairing_counts)
                 }
                 Some(first) => {
@@ -79,7 +80,7 @@ impl Schedule for TournamentFormat {
                     }
                     let mut teams = active;
                     teams.retain(|team| finalists.contains(team));
-                    draws.shuffle(&mut teams);
+                    random_numbers.shuffle(&mut teams);
                     round_robin(&teams, &pairing_counts)
                 }
             },

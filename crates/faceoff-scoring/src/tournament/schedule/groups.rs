@@ -6,7 +6,7 @@ use super::{
     round_robin::round_robin,
 };
 use crate::{
-    draws::Draws,
+    random_numbers::RandomNumbers,
     tournament::{
         departures::Departures,
         game::PlayedGame,
@@ -19,10 +19,10 @@ use faceoff_types::TeamName;
 pub(super) fn draw_groups(
     teams: Vec<&TeamName>,
     groups: usize,
-    draws: &mut Draws,
+    random_numbers: &mut RandomNumbers,
 ) -> Vec<Vec<TeamName>> {
     let mut teams = teams;
-    draws.shuffle(&mut teams);
+    random_numbers.shuffle(&mut teams);
     let mut drawn = vec![Vec::new(); groups];
     for (index, team) in teams.into_iter().enumerate() {
         drawn[index % groups].push(team.clone());

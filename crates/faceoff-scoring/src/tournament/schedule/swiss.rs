@@ -6,7 +6,7 @@ use super::{
     round::{Matchday, Pairing, Round},
 };
 use crate::{
-    draws::Draws,
+    random_numbers::RandomNumbers,
     tournament::{bye::Bye, standings::score_tournament_with},
 };
 use faceoff_types::TeamName;
@@ -17,8 +17,8 @@ use std::collections::BTreeMap;
 /// Teams are sorted by the standings; in the first round the order is random. Each team without an opponent is paired with
 /// the next one that it has not met, unless that would force an avoidable repeat further down. With an odd number of
 /// teams, the lowest of those with the fewest byes has a bye.
-pub(super) fn swiss(progress: &Progress<'_>, draws: &mut Draws) -> Matchday {
-    let mut teams = ranked_teams(progress, draws);
+pub(super) fn swiss(progress: &Progress<'_>, random_numbers: &mut RandomNumbers) -> Matchday {
+    let mut teams = ranked_teams(progress, random_numbers);
     let mut matchday = Matchday::default();
     if !teams.len().is_multiple_of(2) {
         let bye = teams.remove(next_bye(&teams, progress.rounds));
@@ -29,7 +29,7 @@ pub(super) fn swiss(progress: &Progress<'_>, draws: &mut Draws) -> Matchday {
         let [a, b] = [teams[upper], teams[lower]];
         matchday
             .pairings
-            .push(pairing([a, b], &pairing_counts, draws));
+            .push(pairing([a, b], &pairing_counts, random_numbers));
     }
     matchday
 }
@@ -48,9 +48,12 @@ pub(super) fn byes(rounds: &[Round]) -> Vec<Bye> {
 }
 
 /// The active teams, best first; teams without a game or a bye are last, in random order.
-fn ranked_teams<'a>(progress: &Progress<'a>, draws: &mut Draws) -> Vec<&'a TeamName> {
+fn ranked_teams<'a>(
+    progress: &Progress<'a>,
+    random_numbers: &mut RandomNumbers,
+) -> Vec<&'a TeamName> {
     let mut teams: Vec<&TeamName> = progress.active_teams().collect();
-    draws.shuffle(&mut teams);
+    random_numbers.shuffle(&mut teams);
     let byes = byes(progress.rounds);
     let standings = score_tournament_with(progress.games, progress.departures, &byes).standings;
     let ranks: BTreeMap<&TeamName, u32> =
@@ -117,7 +120,7 @@ fn pairs<'a>(teams: &[&'a TeamName], pairing_counts: &PairingCounts<'a>) -> Vec<
 fn pairing<'a>(
     [a, b]: [&'a TeamName; 2],
     pairing_counts: &PairingCounts<'a>,
-    draws: &mut Draws,
+    random_numbers: &mut RandomNumbers,
 ) -> Pairing {
     let balance = pairing_counts.home_balance(a) - pairing_counts.home_balance(b);
     // Positive if `a` had more home games.
@@ -127,7 +130,7 @@ fn pairing<'a>(
         balance
     };
     // Drawn in all cases, so that later draws do not depend on this one.
-    let is_heads = draws.below(2) == 0;
+    let is_heads = random_numbers.below(2) == 0;
     let [home, away] = if lead < 0 || (lead == 0 && is_heads) {
         [a, b]
     } else {

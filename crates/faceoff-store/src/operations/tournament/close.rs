@@ -25,13 +25,13 @@ impl Store {
     ) -> Result<Tournament> {
         self.write(actor, now, async |tx| {
             let mut tournament = tournaments::find_open(tx, id).await?;
-            let open = games::open(tx, id).await?.len();
+            let open = games::unfinished(tx, id).await?.len();
             if open > 0 {
                 return StoreError::conflict(format!(
                     "{open} games are queued or running: wait for their end, or cancel those that do not count"
                 ));
             }
-            if let Some(pending) = games::pending(tx, id).await?.first() {
+            if let Some(pending) = games::pending_of_rounds(tx, id).await?.first() {
                 return StoreError::conflict(format!(
                     "game {} has no result: play it again, or let one of its teams leave",
                     pending.game

@@ -38,7 +38,10 @@ async fn check_accepts_entrants(tx: &mut Tx, tournament: &Tournament) -> Result<
             "the groups are drawn, so no team can be added: open another tournament",
         );
     }
-    if !games::pending(tx, tournament.id).await?.is_empty() {
+    if !games::pending_of_rounds(tx, tournament.id)
+        .await?
+        .is_empty()
+    {
         return StoreError::conflict(
             "a round is under way: teams can be added before the first round, or between two",
         );
@@ -69,14 +72,14 @@ async fn cancel_open_games(
         );
         let is_kept = matches!(
             game.purpose,
-            GamePurpose::Round(entry) if played_until.is_some_and(|until| entry.round < until)
+            GamePurpose::Round(schedule_entry) if played_until.is_some_and(|until| schedule_entry.round < until)
         );
         if is_over || is_kept || !game.teams.contains(&team) {
             continue;
         }
         game_lifecycle::cancel(tx, &game, reason).await?;
-        if let GamePurpose::Round(entry) = game.purpose {
-            rounds.insert(entry.round);
+        if let GamePurpose::Round(schedule_entry) = game.purpose {
+            rounds.insert(schedule_entry.round);
         }
     }
     for round in rounds {
@@ -89,7 +92,7 @@ async fn cancel_open_games(
 /// Reruns of earlier rounds' games do not make those rounds current.
 async fn current_round(tx: &mut Tx, id: TournamentId) -> Result<RoundNumber> {
     let newest = rounds::count(tx, id).await?;
-    let pending = games::pending(tx, id).await?;
+    let pending = games::pending_of_rounds(tx, id).await?;
     let is_under_way = pending.iter().any(|pending| pending.round.get() == newest);
     round_number(if is_under_way { newest } else { newest + 1 })
 }

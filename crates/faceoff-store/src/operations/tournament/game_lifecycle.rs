@@ -9,7 +9,7 @@ use crate::{
         jobs::{Job, RunSeeds},
         purpose::Purpose,
     },
-    queue::{self, Account, JobClaim, NewJob},
+    queue::{self, JobClaim, NewJob, SlotTimeAccount},
     store::Store,
     tables::{
         bundles,
@@ -26,27 +26,32 @@ use uuid::Uuid;
 
 /// The account charged with a game's slot time: that of the tournament, or of the team that requested the game. For many
 /// games it is looked up once, since the lookup reads the whole queue.
-pub(super) async fn account(tx: &mut Tx, game: &Game, job: NewJob) -> Result<Account> {
+pub(super) async fn open_account(tx: &mut Tx, game: &Game, job: NewJob) -> Result<SlotTimeAccount> {
     let holder = match game.purpose {
         GamePurpose::Round(_)
-        | GamePurpose::Replay { .. }
+        | GamePurpose::ScheduleReplay { .. }
         | GamePurpose::Test { asked_by: None } => game.tournament.to_string(),
         GamePurpose::Test {
             asked_by: Some(team),
         }
         | GamePurpose::Friendly { asked_by: team } => team.to_string(),
     };
-    queue::account(tx, job.lane, &holder).await
+    queue::open_account(tx, job.lane, &holder).await
 }
 
 /// Adds a game's job to the queue. Games of a round are queued by matchday (the games that teams play at the same time).
-async fn insert_job(tx: &mut Tx, game: &Game, job: NewJob, account: Account) -> Result<Uuid> {
+async fn insert_job(
+    tx: &mut Tx,
+    game: &Game,
+    job: NewJob,
+    account: SlotTimeAccount,
+) -> Result<Uuid> {
     for submission in game.submissions {
         bundles::check_available(tx, submission).await?;
     }
     let batch = match game.purpose {
-        GamePurpose::Round(entry) => i64::from(entry.matchday),
-        GamePurpose::Replay { replay, .. } => i64::from(replay),
+        GamePurpose::Round(schedule_entry) => i64::from(schedule_entry.matchday),
+        GamePurpose::ScheduleReplay { replay, .. } => i64::from(replay),
         GamePurpose::Test { .. } | GamePurpose::Friendly { .. } => 0,
     };
     queue::insert(tx, NewJob { batch, ..job }, account).await
@@ -55,7 +60,7 @@ async fn insert_job(tx: &mut Tx, game: &Game, job: NewJob, account: Account) -> 
 /// Adds a game and queues it. [`StoreError::Conflict`] if the bundle of one of the
 /// two submissions was removed.
 pub(super) async fn enqueue(tx: &mut Tx, game: &Game, job: NewJob) -> Result<()> {
-    let account = account(tx, game, job).await?;
+    let account = open_account(tx, game, job).await?;
     enqueue_for(tx, game, job, account).await
 }
 
@@ -64,7 +69,7 @@ pub(super) async fn enqueue_for(
     tx: &mut Tx,
     game: &Game,
     job: NewJob,
-    account: Account,
+    account: SlotTimeAccount,
 ) -> Result<()> {
     let job_id = insert_job(tx, game, job, account).await?;
     games::insert(tx, game, job_id).await
@@ -72,7 +77,7 @@ pub(super) async fn enqueue_for(
 
 /// Queues a game without a result again.
 pub(super) async fn enqueue_again(tx: &mut Tx, game: &Game, job: NewJob) -> Result<()> {
-    let account = account(tx, game, job).await?;
+    let account = open_account(tx, game, job).await?;
     let job_id = insert_job(tx, game, job, account).await?;
     game_transitions::requeue(tx, game.id, job_id).await
 }
@@ -162,10 +167,12 @@ pub(super) async fn cancel(tx: &mut Tx, game: &Game, reason: &str) -> Result<()>
 
 async fn end_round_of_game(tx: &mut Tx, game: &Game) -> Result<()> {
     match game.purpose {
-        GamePurpose::Round(entry) => end_round_if_over(tx, game.tournament, entry.round).await,
-        GamePurpose::Test { .. } | GamePurpose::Friendly { .. } | GamePurpose::Replay { .. } => {
-            Ok(())
+        GamePurpose::Round(schedule_entry) => {
+            end_round_if_over(tx, game.tournament, schedule_entry.round).await
         }
+        GamePurpose::Test { .. }
+        | GamePurpose::Friendly { .. }
+        | GamePurpose::ScheduleReplay { .. } => Ok(()),
     }
 }
 
@@ -175,7 +182,7 @@ pub(super) async fn end_round_if_over(
     id: TournamentId,
     round: RoundNumber,
 ) -> Result<()> {
-    let pending = games::pending(tx, id).await?;
+    let pending = games::pending_of_rounds(tx, id).await?;
     let is_pending = pending.iter().any(|pending| pending.round == round);
     let now = tx.now;
     if !is_pending && rounds::set_ended(tx, id, round, now).await? {

@@ -3,9 +3,9 @@
 mod close;
 mod current_entrants;
 pub(crate) mod entrants;
+mod game_decisions;
 pub(crate) mod game_lifecycle;
 pub(crate) mod open;
-pub(crate) mod replays;
 mod rounds;
-mod rulings;
+pub(crate) mod schedule_replays;
 mod test_and_friendly_games;

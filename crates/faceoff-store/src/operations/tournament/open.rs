@@ -7,9 +7,8 @@ use crate::{
     queue,
     store::Store,
     tables::{
-        entrants, games, rounds,
-        rulings::Ruling,
-        season, stages,
+        decision_records::DecisionRecord,
+        entrants, games, rounds, season, stages,
         submissions::{self, SubmissionState},
         teams,
         tournaments::{self, Tournament},
@@ -180,7 +179,7 @@ impl Store {
                 return StoreError::conflict("the tournament is paused already: resume it first");
             }
             let reason = reason.to_owned();
-            tournament.paused = Some(Ruling {
+            tournament.paused = Some(DecisionRecord {
                 at: now,
                 reason: reason.clone(),
             });
@@ -207,7 +206,7 @@ impl Store {
                 );
             }
             tournaments::update(tx, &tournament).await?;
-            for game in games::open(tx, id).await? {
+            for game in games::unfinished(tx, id).await? {
                 let job = games::job_of(tx, game.id).await?;
                 queue::unpark(tx, job).await?;
             }

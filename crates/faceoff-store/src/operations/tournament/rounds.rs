@@ -51,7 +51,7 @@ async fn check_is_next_round(
             tournament.rules.format.last_round()
         ));
     }
-    let pending = games::pending(tx, tournament.id).await?;
+    let pending = games::pending_of_rounds(tx, tournament.id).await?;
     if let Some(first) = pending.first() {
         return StoreError::conflict(format!(
             "{} games of earlier rounds have no result, the first is game {}: wait for them, rerun them, or let a team \
@@ -172,8 +172,9 @@ async fn queue_games(
                 };
                 let account = match account {
                     Some(account) => account,
-                    None => *account
-                        .insert(game_lifecycle::account(tx, &game, purpose::ROUND_GAME).await?),
+                    None => *account.insert(
+                        game_lifecycle::open_account(tx, &game, purpose::ROUND_GAME).await?,
+                    ),
                 };
                 game_lifecycle::enqueue_for(tx, &game, purpose::ROUND_GAME, account).await?;
                 count += 1;

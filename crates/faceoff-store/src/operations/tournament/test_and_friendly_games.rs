@@ -42,7 +42,7 @@ async fn find_between_rounds(
         }
         teams::check_may_compete(tx, *team).await?;
     }
-    if !games::pending(tx, id).await?.is_empty() {
+    if !games::pending_of_rounds(tx, id).await?.is_empty() {
         return StoreError::conflict(
             "a round is under way; test and friendly games are possible before and between rounds: try again when it is over",
         );

@@ -121,7 +121,7 @@ pub(super) async fn act(client: &Client, json: bool, action: DayAction) -> anyho
 
 /// The evaluations that a day has started.
 fn started_lines(day: &DayView) -> Vec<String> {
-    let started = format!("{}: {} evaluations started", day.day, day.created.len());
+    let started = format!("{}: {} evaluations started", day.day, day.evaluations.len());
     [vec![started], evaluation_lines(day)].concat()
 }
 

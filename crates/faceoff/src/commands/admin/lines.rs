@@ -11,5 +11,5 @@ pub(super) fn evaluation_line(evaluation: &EvaluationView) -> String {
 
 /// Formats the evaluations that a day has started, one line each.
 pub(super) fn evaluation_lines(day: &DayView) -> Vec<String> {
-    day.created.iter().map(evaluation_line).collect()
+    day.evaluations.iter().map(evaluation_line).collect()
 }

@@ -179,7 +179,7 @@ fn evaluation_line(evaluation: &ProposedEvaluationView) -> String {
             "running, {} of {} episodes",
             evaluation.progress.episodes_done, evaluation.progress.episodes_total
         ),
-        ProposedEvaluationStatus::Finalising => "computing the score".to_owned(),
+        ProposedEvaluationStatus::Scoring => "computing the score".to_owned(),
         ProposedEvaluationStatus::Finished { result, .. } => format!(
             "score {:.1}, {:.1} penalty points{}",
             result.score,

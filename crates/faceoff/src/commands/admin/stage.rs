@@ -187,13 +187,13 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
                 format!(
                     "{}: final day, {} evaluations started",
                     day.day,
-                    day.created.len()
+                    day.evaluations.len()
                 )
             })
         }
         StageAction::Finalise { stage, confirm } => {
             let stage = find_stage(client, &stage).await?;
-            let signed_off = client.finalise(stage.id, confirm).await?;
+            let signed_off = client.sign_off_stage(stage.id, confirm).await?;
             print(json, &signed_off, stage_text)
         }
     }
@@ -234,7 +234,7 @@ fn stage_text(stage: &StageView) -> String {
         Some(next) => next.to_string(),
         None => "none".to_owned(),
     };
-    let result = match &stage.finalised {
+    let result = match &stage.sign_off {
         Some(sign_off) => format!(
             "signed off on {} by {}",
             local_time(sign_off.at),

@@ -161,7 +161,7 @@ pub(super) async fn act(client: &Client, json: bool, action: TeamAction) -> anyh
 
 fn team_line(team: &TeamView) -> String {
     let disqualified = match &team.disqualified {
-        Some(ruling) => format!("  disqualified: {}", ruling.reason),
+        Some(decision) => format!("  disqualified: {}", decision.reason),
         None => String::new(),
     };
     format!(

@@ -183,8 +183,8 @@ pub(super) async fn act(
         } => {
             let id = find_tournament(client, &tournament).await?;
             let champion_shares = match times {
-                Some(times) => client.request_replays(id, times).await?,
-                None => client.cancel_replays(id).await?,
+                Some(times) => client.request_schedule_replays(id, times).await?,
+                None => client.cancel_schedule_replays(id).await?,
             };
             return print(json, &champion_shares, text::champion_shares_text);
         }
@@ -276,7 +276,7 @@ pub(super) async fn act(
         } => {
             let departure = NewDeparture {
                 team,
-                r#as: if disqualified {
+                kind: if disqualified {
                     DepartureKind::Disqualified
                 } else {
                     DepartureKind::Withdrawn

@@ -43,14 +43,14 @@ pub(super) fn board_text(board: &BoardView) -> String {
         let _ = writeln!(
             text,
             "baseline: {},{tier} score {:.1}, {:.2} penalty points, would be rank {}",
-            row.team, row.score, row.penalty_points, row.would_rank
+            row.team, row.score, row.penalty_points, row.hypothetical_rank
         );
     }
     for team in &board.disqualified {
         let reason = team
             .disqualified
             .as_ref()
-            .map_or("", |ruling| &ruling.reason);
+            .map_or("", |decision| &decision.reason);
         let _ = writeln!(text, "disqualified: {}: {reason}", team.name);
     }
     text.trim_end().to_owned()

@@ -26,7 +26,7 @@ pub(super) struct Matchup {
 pub(super) fn load_config(options: &PlayOptions) -> anyhow::Result<Config> {
     let config = Config::load(options.config.as_deref())?;
     config
-        .check_playable(mismatch_seed(options))
+        .check_season_magnitudes(mismatch_seed(options))
         .context("the configuration")?;
     Ok(config)
 }

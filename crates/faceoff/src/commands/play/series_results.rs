@@ -74,7 +74,7 @@ pub(super) struct SeriesGame {
     reason: ResultReason,
     /// The game as the scoring of tournaments reads it.
     #[serde(skip)]
-    entry: PlayedGame,
+    played_game: PlayedGame,
 }
 
 impl SeriesGame {
@@ -96,10 +96,10 @@ impl SeriesGame {
         if swapped {
             teams.reverse();
         }
-        let mut entry = score.entry(RoundNumber::FIRST, teams);
-        entry.pair = pair;
-        let entry = PlayedGame::try_from(entry).context("reading the game's score")?;
-        let mut penalty_points = entry.penalty_points();
+        let mut game_entry = score.game_entry(RoundNumber::FIRST, teams);
+        game_entry.pair = pair;
+        let played_game = PlayedGame::try_from(game_entry).context("reading the game's score")?;
+        let mut penalty_points = played_game.penalty_points();
         if swapped {
             penalty_points.reverse();
         }
@@ -113,13 +113,13 @@ impl SeriesGame {
             pair,
             seed: score.seed,
             home: u32::from(swapped),
-            goals: in_agent_sequence(entry.counted_goals()),
+            goals: in_agent_sequence(played_game.counted_goals()),
             fouls: in_agent_sequence([first.fouls, second.fouls]),
-            score: in_agent_sequence(entry.score()),
+            score: in_agent_sequence(played_game.score()),
             penalty_points,
             winner,
             reason: score.reason,
-            entry,
+            played_game,
         })
     }
 
@@ -145,7 +145,7 @@ impl SeriesResults {
         let differences = games
             .chunks(games_per_row)
             .map(|games| games.iter().map(SeriesGame::difference).sum());
-        let pairs = find_mirrored_pairs(games.iter().map(|game| &game.entry))
+        let pairs = find_mirrored_pairs(games.iter().map(|game| &game.played_game))
             .context("comparing the pairs")?;
         Ok(Self {
             series: kind,

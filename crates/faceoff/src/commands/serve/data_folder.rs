@@ -182,7 +182,7 @@ fn load_or_create_host_token(data_dir: &Path) -> anyhow::Result<[u8; 32]> {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
         Err(error) => return Err(error).with_context(|| format!("reading {}", file.display())),
     }
-    let token = Secret::generate(SecretKind::Admin).context("generating the organiser's token")?;
+    let token = Secret::generate(SecretKind::Host).context("generating the organiser's token")?;
     write_secret(&file, token.as_str())?;
     tracing::info!(file = %file.display(), "created the organiser's token; keep the file secret");
     Ok(token.hash())

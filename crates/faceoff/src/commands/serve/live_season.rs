@@ -197,13 +197,13 @@ async fn shorten_due_times(config: &Config, store: &Store, now: Timestamp) -> an
 async fn configure_season(config: &Config, store: &Store, now: Timestamp) -> anyhow::Result<()> {
     if let Some(name) = &config.season.name {
         store
-            .name_season(Actor::Organiser, name, now)
+            .name_season(Actor::Host, name, now)
             .await
             .context("naming the season")?;
     }
     let season = store.season().await.context("reading the season")?;
     config
-        .check_playable(season.secret.model_mismatch())
+        .check_season_magnitudes(season.secret.model_mismatch())
         .context("the configuration")?;
     store
         .configure_stage(

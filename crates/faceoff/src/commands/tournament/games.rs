@@ -50,7 +50,7 @@ fn purpose_text(purpose: &PurposeView) -> String {
         PurposeView::Round {
             round, matchday, ..
         } => format!("{round}, day {matchday}"),
-        PurposeView::Replay { replay, round, .. } => format!("{round}, replay {replay}"),
+        PurposeView::ScheduleReplay { replay, round, .. } => format!("{round}, replay {replay}"),
         PurposeView::Test { .. } => "test".to_owned(),
         PurposeView::Friendly { .. } => "friendly".to_owned(),
     }
@@ -109,7 +109,7 @@ pub(in crate::commands) fn game_text(game: &GameView) -> String {
         PurposeView::Friendly { requested_by } => {
             format!("friendly game requested by {requested_by}, does not count")
         }
-        PurposeView::Replay { replay, round, .. } => {
+        PurposeView::ScheduleReplay { replay, round, .. } => {
             format!("replay {replay} of round {round}, does not count")
         }
     };

@@ -124,7 +124,7 @@ fn entrant_text(entrant: &EntrantView) -> String {
     match &entrant.departure {
         None => entrant.team_name.to_string(),
         Some(departure) => {
-            let kind = match departure.r#as {
+            let kind = match departure.kind {
                 DepartureKind::Withdrawn => "withdrawn",
                 DepartureKind::Disqualified => "disqualified",
             };

@@ -41,7 +41,7 @@ async fn repeated_schedules_give_the_champion_probabilities() {
     );
     // In every second replay B wins all its games.
     let outcome = |game: &faceoff_store::Game, names: [&str; 2]| {
-        let GamePurpose::Replay { replay, .. } = game.purpose else {
+        let GamePurpose::ScheduleReplay { replay, .. } = game.purpose else {
             panic!("expected a replay");
         };
         match names {

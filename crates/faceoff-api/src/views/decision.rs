@@ -1,4 +1,4 @@
-//! Rulings: decisions of organisers, with time and reason.
+//! The record of an organiser's decision, with time and reason.
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
@@ -6,7 +6,8 @@ use utoipa::ToSchema;
 
 /// An organiser's decision about a result, a team or the queue.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-pub struct RulingView {
+#[schema(as = RulingView)]
+pub struct DecisionView {
     /// When it was made.
     pub at: Timestamp,
     /// The organiser's reason.

@@ -1,4 +1,4 @@
-//! Rulings: organisers' decisions on results and teams (voiding, disqualification), which take effect at once and have a
+//! Organisers' decisions on results and teams (voiding, disqualification), which take effect at once and have a
 //! reason.
 
 use crate::{
@@ -12,11 +12,11 @@ use crate::{
     queries,
     store::Store,
     tables::{
-        counting_evaluations, days, entrants, evaluation_specs,
+        counting_evaluations, days,
+        decision_records::DecisionRecord,
+        entrants, evaluation_specs,
         evaluations::{Evaluation, Failure},
-        rounds,
-        rulings::Ruling,
-        sign_offs,
+        rounds, sign_offs,
         teams::{self, Team},
         tournaments,
     },
@@ -26,12 +26,12 @@ use faceoff_types::{DepartureKind, EvaluationId, StageDay, TeamId};
 use jiff::Timestamp;
 
 pub(crate) async fn void(tx: &mut Tx, id: EvaluationId, reason: &str) -> Result<()> {
-    let ruling = Ruling {
+    let decision = DecisionRecord {
         at: tx.now,
         reason: reason.to_owned(),
     };
-    counting_evaluations::set_voided(tx, id, &ruling).await?;
-    let reason = ruling.reason;
+    counting_evaluations::set_voided(tx, id, &decision).await?;
+    let reason = decision.reason;
     tx.record(Subject::Evaluation(id), Event::EvaluationVoided { reason });
     Ok(())
 }
@@ -142,18 +142,18 @@ impl Store {
             if teams::find(tx, id).await?.disqualified.is_some() {
                 return StoreError::conflict("the team is disqualified already");
             }
-            let ruling = Ruling {
+            let decision = DecisionRecord {
                 at: now,
                 reason: reason.to_owned(),
             };
-            teams::set_disqualified(tx, id, Some(&ruling)).await?;
+            teams::set_disqualified(tx, id, Some(&decision)).await?;
             let cancellation_reason = format!("the team is disqualified: {reason}");
             for evaluation in counting_evaluations::open_of_team(tx, id).await? {
                 let cancelled = Failure::Cancelled(&cancellation_reason);
                 completion::fail_evaluation(tx, evaluation, cancelled).await?;
             }
             leave_tournaments(tx, id, &cancellation_reason).await?;
-            let reason = ruling.reason;
+            let reason = decision.reason;
             tx.record(Subject::Team(id), Event::TeamDisqualified { reason });
             teams::find(tx, id).await
         })

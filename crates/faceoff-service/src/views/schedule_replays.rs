@@ -31,7 +31,7 @@ pub async fn champion_shares(
 
 async fn compute(app: &App, id: TournamentId) -> Result<ChampionSharesView, Problem> {
     let state = TournamentState::find(app, id).await?;
-    let games = app.store.games(id, GameFilter::Replays).await?;
+    let games = app.store.games(id, GameFilter::ScheduleReplays).await?;
     // Every result is parsed and scored, which takes a while for a thousand replays.
     let shares = tokio::task::spawn_blocking(move || count_champions(&state, &games));
     shares.await.map_err(Problem::internal)?
@@ -40,7 +40,7 @@ async fn compute(app: &App, id: TournamentId) -> Result<ChampionSharesView, Prob
 fn count_champions(state: &TournamentState, games: &[Game]) -> Result<ChampionSharesView, Problem> {
     let mut replays = BTreeMap::<u32, Vec<&Game>>::new();
     for game in games {
-        if let GamePurpose::Replay { replay, .. } = game.purpose {
+        if let GamePurpose::ScheduleReplay { replay, .. } = game.purpose {
             replays.entry(replay).or_default().push(game);
         }
     }

@@ -1,5 +1,5 @@
-//! Rulings: organisers' decisions about results, teams and the queue. Each takes effect at once and has a public reason. A
-//! ruling that cannot be undone needs a confirmation with the name of the affected resource.
+//! Organisers' decisions about results, teams and the queue. Each takes effect at once and has a public reason. A
+//! decision that cannot be undone needs a confirmation with the name of the affected resource.
 
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_api::{
@@ -11,7 +11,7 @@ use faceoff_service::{
     auth::Organiser,
     extract::{Json as Body, PathParam, StageDayPath},
     problem::Problem,
-    services::rulings,
+    services::organiser_decisions,
     views::{day, evaluation, team},
 };
 use faceoff_types::{EvaluationId, StageId, TeamId};
@@ -34,7 +34,8 @@ pub(crate) async fn void_evaluation(
     PathParam(id): PathParam<EvaluationId>,
     Body(decision): Body<Decision>,
 ) -> Result<Json<EvaluationView>, Problem> {
-    let voided = rulings::void_evaluation(&app, organiser.actor(), id, &decision).await?;
+    let voided =
+        organiser_decisions::void_evaluation(&app, organiser.actor(), id, &decision).await?;
     evaluation::for_organiser(&app, voided).await.map(Json)
 }
 
@@ -56,7 +57,7 @@ pub(crate) async fn void_day(
     StageDayPath(stage_day): StageDayPath,
     Body(decision): Body<Decision>,
 ) -> Result<Json<DayView>, Problem> {
-    rulings::void_day(&app, organiser.actor(), stage_day, &decision).await?;
+    organiser_decisions::void_day(&app, organiser.actor(), stage_day, &decision).await?;
     day::build(&app, stage_day).await.map(Json)
 }
 
@@ -71,7 +72,7 @@ pub(crate) async fn pause_queue(
     State(app): State<App>,
     Body(Reason { reason }): Body<Reason>,
 ) -> Result<StatusCode, Problem> {
-    rulings::pause_queue(&app, organiser.actor(), &reason).await?;
+    organiser_decisions::pause_queue(&app, organiser.actor(), &reason).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
@@ -84,7 +85,7 @@ pub(crate) async fn resume_queue(
     organiser: Organiser,
     State(app): State<App>,
 ) -> Result<StatusCode, Problem> {
-    rulings::resume_queue(&app, organiser.actor()).await?;
+    organiser_decisions::resume_queue(&app, organiser.actor()).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
@@ -106,7 +107,7 @@ pub(crate) async fn disqualify_team(
     PathParam(id): PathParam<TeamId>,
     Body(decision): Body<Decision>,
 ) -> Result<Json<TeamView>, Problem> {
-    let team = rulings::disqualify_team(&app, organiser.actor(), id, &decision).await?;
+    let team = organiser_decisions::disqualify_team(&app, organiser.actor(), id, &decision).await?;
     Ok(Json(team::view(team)))
 }
 
@@ -127,6 +128,6 @@ pub(crate) async fn reinstate_team(
     PathParam(id): PathParam<TeamId>,
     Body(Reason { reason }): Body<Reason>,
 ) -> Result<Json<TeamView>, Problem> {
-    let team = rulings::reinstate_team(&app, organiser.actor(), id, &reason).await?;
+    let team = organiser_decisions::reinstate_team(&app, organiser.actor(), id, &reason).await?;
     Ok(Json(team::view(team)))
 }

@@ -1,4 +1,4 @@
-//! Rulings on games: an organiser voids a result, or lets a game be played again.
+//! Decisions on games: an organiser voids a result, or lets a game be played again.
 
 use crate::{
     boxed,
@@ -64,11 +64,11 @@ impl Store {
                 );
             }
             let job = match game.purpose {
-                GamePurpose::Round(entry) => {
+                GamePurpose::Round(schedule_entry) => {
                     let has_left = |entrant: &Entrant| {
                         let departure = entrant.departure.as_ref();
                         game.teams.contains(&entrant.team)
-                            && departure.is_some_and(|departure| departure.from_round <= entry.round)
+                            && departure.is_some_and(|departure| departure.from_round <= schedule_entry.round)
                     };
                     if entrants::all(tx, game.tournament).await?.iter().any(has_left) {
                         return StoreError::conflict(
@@ -82,7 +82,7 @@ impl Store {
                         "a game that does not count cannot be rerun: request another one",
                     );
                 }
-                GamePurpose::Replay { .. } => purpose::REPLAY_GAME,
+                GamePurpose::ScheduleReplay { .. } => purpose::SCHEDULE_REPLAY_GAME,
             };
             game_lifecycle::enqueue_again(tx, &game, job).await?;
             tx.record(Subject::Game(id), Event::GameQueuedAgain);

@@ -1,16 +1,16 @@
-//! Deterministic random draws: the same key gives the same numbers.
+//! Deterministic random numbers: the same key gives the same numbers.
 
 use faceoff_types::Seed;
 
 /// Random numbers from an endless stream of bytes.
-pub(crate) struct Draws {
+pub(crate) struct RandomNumbers {
     stream: blake3::OutputReader,
     buffer: Box<[u8; Self::BUFFER_BYTES]>,
     /// Bytes of `buffer` that are consumed.
     used: usize,
 }
 
-impl Draws {
+impl RandomNumbers {
     const BUFFER_BYTES: usize = 16 * 1024;
 
     pub(crate) fn new(stream: blake3::OutputReader) -> Self {

@@ -8,7 +8,7 @@ use serde::Serialize;
 /// `env` of `hello`: constants of the simulation, under the names of the challenge's `env_info`.
 /// SI units, radians.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Env {
+pub(crate) struct HelloEnv {
     /// Duration of a control step, seconds.
     dt: f64,
     /// Number of robots that agents control.
@@ -76,7 +76,7 @@ struct RobotEnv {
     base_frame: Vec<[[f64; 4]; 4]>,
 }
 
-impl Env {
+impl HelloEnv {
     /// Indices of the puck's x, y, yaw.
     const PUCK_POS_IDS: [usize; 3] = [0, 1, 2];
     /// Indices of the rates of x, y, yaw.
@@ -93,9 +93,9 @@ impl Env {
 ///
 /// # Errors
 /// If the simulator has no such task.
-pub(crate) fn env(agent_task: AgentTask) -> Result<Env, UnknownTask> {
+pub(crate) fn hello_env(agent_task: AgentTask) -> Result<HelloEnv, UnknownTask> {
     let (info, episode_steps, has_opponent) = match agent_task {
-        AgentTask::Qualifying(task) => {
+        AgentTask::Episodes(task) => {
             let task = task.try_into()?;
             (env_info(task), EPISODE_STEPS, task == AirHockeyTask::Hit)
         }
@@ -121,17 +121,17 @@ pub(crate) fn env(agent_task: AgentTask) -> Result<Env, UnknownTask> {
         dt,
     } = info;
     let opponent: &[usize] = if has_opponent {
-        &Env::OPPONENT_EE_IDS
+        &HelloEnv::OPPONENT_EE_IDS
     } else {
         &[]
     };
-    Ok(Env {
+    Ok(HelloEnv {
         dt,
         n_agents,
-        puck_pos_ids: Env::PUCK_POS_IDS.to_vec(),
-        puck_vel_ids: Env::PUCK_VEL_IDS.to_vec(),
-        joint_pos_ids: Env::JOINT_POS_IDS.to_vec(),
-        joint_vel_ids: Env::JOINT_VEL_IDS.to_vec(),
+        puck_pos_ids: HelloEnv::PUCK_POS_IDS.to_vec(),
+        puck_vel_ids: HelloEnv::PUCK_VEL_IDS.to_vec(),
+        joint_pos_ids: HelloEnv::JOINT_POS_IDS.to_vec(),
+        joint_vel_ids: HelloEnv::JOINT_VEL_IDS.to_vec(),
         opponent_ee_ids: opponent.to_vec(),
         table: TableEnv {
             length: table_length,
@@ -183,7 +183,7 @@ mod tests {
 
     /// The message as agents get it.
     fn hello(agent_task: AgentTask) -> Value {
-        let env = to_raw_value(&env(agent_task).unwrap()).unwrap();
+        let env = to_raw_value(&hello_env(agent_task).unwrap()).unwrap();
         let mut line = Vec::new();
         Message::hello(agent_task, &env).write_line(&mut line);
         serde_json::from_slice(&line).unwrap()
@@ -237,7 +237,7 @@ mod tests {
         let (_, rest) = document.split_once("```json\n").expect("a block of JSON");
         let (quoted, _) = rest.split_once("```").expect("the block's end");
         let quoted: serde_json::Value = serde_json::from_str(quoted).expect("JSON");
-        let agent_task = AgentTask::Qualifying(DEFEND);
+        let agent_task = AgentTask::Episodes(DEFEND);
         assert_eq!(quoted, hello(agent_task));
     }
 }

@@ -18,7 +18,7 @@ use jiff::Timestamp;
 use std::collections::BTreeMap;
 
 /// Maximum number of replays of a schedule.
-pub const MAX_REPLAYS: u32 = 1000;
+pub const MAX_SCHEDULE_REPLAYS: u32 = 1000;
 
 /// Maximum number of games in all replays of a tournament: they are queued at once, and read at once.
 pub const MAX_REPLAYED_GAMES: u32 = 10_000;
@@ -36,7 +36,8 @@ async fn counting_games(tx: &mut Tx, id: TournamentId, mut games: Vec<Game>) -> 
                 .purpose
                 .schedule_entry()
                 .zip(departure_rounds.get(team));
-            entry_and_departure.is_some_and(|(entry, from_round)| entry.round >= *from_round)
+            entry_and_departure
+                .is_some_and(|(schedule_entry, from_round)| schedule_entry.round >= *from_round)
         };
         matches!(game.state, GameState::Played(_)) && !game.teams.iter().any(had_left)
     });
@@ -46,9 +47,9 @@ async fn counting_games(tx: &mut Tx, id: TournamentId, mut games: Vec<Game>) -> 
 impl Store {
     /// Queues all games of all rounds again, `times` times, with the same submissions and new seeds. The games do not
     /// count and are not recorded. Returns the number of games. [`StoreError::Conflict`] if not all rounds are over, or
-    /// beyond [`MAX_REPLAYS`] or [`MAX_REPLAYED_GAMES`].
+    /// beyond [`MAX_SCHEDULE_REPLAYS`] or [`MAX_REPLAYED_GAMES`].
     #[boxed]
-    pub async fn request_replays(
+    pub async fn request_schedule_replays(
         &self,
         actor: Actor,
         id: TournamentId,
@@ -65,17 +66,17 @@ impl Store {
                     "a schedule can be replayed once all its games are over: {started} of {rounds} rounds have started"
                 ));
             }
-            let pending = games::pending(tx, id).await?.len();
+            let pending = games::pending_of_rounds(tx, id).await?.len();
             if pending > 0 {
                 return StoreError::conflict(format!(
                     "a schedule can be replayed once all its games are over: {pending} games have no result yet"
                 ));
             }
             let last = games::last_replay(tx, id).await?;
-            if times == 0 || times > MAX_REPLAYS - last.min(MAX_REPLAYS) {
+            if times == 0 || times > MAX_SCHEDULE_REPLAYS - last.min(MAX_SCHEDULE_REPLAYS) {
                 return StoreError::conflict(format!(
-                    "times: expected 1 to {}, since {last} of {MAX_REPLAYS} replays exist; got {times}",
-                    MAX_REPLAYS.saturating_sub(last)
+                    "times: expected 1 to {}, since {last} of {MAX_SCHEDULE_REPLAYS} replays exist; got {times}",
+                    MAX_SCHEDULE_REPLAYS.saturating_sub(last)
                 ));
             }
             let schedule = counting_games(tx, id, schedule).await?;
@@ -95,8 +96,8 @@ impl Store {
                     };
                     let game = Game {
                         id: GameId::new(),
-                        purpose: GamePurpose::Replay { replay, original },
-                        seed: GameSeedLabel::Replay {
+                        purpose: GamePurpose::ScheduleReplay { replay, original },
+                        seed: GameSeedLabel::ScheduleReplay {
                             tournament: tournament.number,
                             replay,
                             round: original.round,
@@ -108,9 +109,9 @@ impl Store {
                     };
                     let account = match account {
                         Some(account) => account,
-                        None => *account.insert(game_lifecycle::account(tx, &game, purpose::REPLAY_GAME).await?),
+                        None => *account.insert(game_lifecycle::open_account(tx, &game, purpose::SCHEDULE_REPLAY_GAME).await?),
                     };
-                    game_lifecycle::enqueue_for(tx, &game, purpose::REPLAY_GAME, account).await?;
+                    game_lifecycle::enqueue_for(tx, &game, purpose::SCHEDULE_REPLAY_GAME, account).await?;
                     count += 1;
                 }
             }
@@ -126,7 +127,7 @@ impl Store {
 
     /// Cancels the replays that are not over. Returns the number of games.
     #[boxed]
-    pub async fn cancel_replays(
+    pub async fn cancel_schedule_replays(
         &self,
         actor: Actor,
         id: TournamentId,
@@ -135,8 +136,8 @@ impl Store {
         self.write(actor, now, async |tx| {
             tournaments::find_open(tx, id).await?;
             let mut count = 0;
-            for game in games::open(tx, id).await? {
-                if let GamePurpose::Replay { .. } = game.purpose {
+            for game in games::unfinished(tx, id).await? {
+                if let GamePurpose::ScheduleReplay { .. } = game.purpose {
                     game_lifecycle::cancel(tx, &game, "the organisers cancelled the replays")
                         .await?;
                     count += 1;

@@ -2,15 +2,15 @@
 //! champion shows how certain the champion is.
 
 use axum::{Json, extract::State, http::StatusCode};
-use faceoff_api::{requests::NewReplays, views::champion_shares::ChampionSharesView};
+use faceoff_api::{requests::NewScheduleReplays, views::champion_shares::ChampionSharesView};
 use faceoff_service::{
     app::App,
     auth::Organiser,
     extract::{Json as Body, PathParam},
     problem::Problem,
-    views::replays,
+    views::schedule_replays,
 };
-use faceoff_store::MAX_REPLAYS;
+use faceoff_store::MAX_SCHEDULE_REPLAYS;
 use faceoff_types::TournamentId;
 
 /// Replays the whole schedule several times with the same submissions and other seeds.
@@ -18,7 +18,7 @@ use faceoff_types::TournamentId;
 /// Replays never count, are not recorded, and run behind all games that count.
 #[utoipa::path(
     post, path = "/tournaments/{id}/replays", tag = "organiser", security(("organiser" = [])),
-    params(("id" = TournamentId, Path)), request_body = NewReplays,
+    params(("id" = TournamentId, Path)), request_body = NewScheduleReplays,
     responses(
         (status = 201, body = ChampionSharesView),
         (status = 404),
@@ -30,19 +30,19 @@ pub(crate) async fn order_replays(
     organiser: Organiser,
     State(app): State<App>,
     PathParam(id): PathParam<TournamentId>,
-    Body(NewReplays { times }): Body<NewReplays>,
+    Body(NewScheduleReplays { times }): Body<NewScheduleReplays>,
 ) -> Result<(StatusCode, Json<ChampionSharesView>), Problem> {
-    if !(1..=MAX_REPLAYS).contains(&times) {
-        let detail = format!("expected 1 to {MAX_REPLAYS}, got {times}");
+    if !(1..=MAX_SCHEDULE_REPLAYS).contains(&times) {
+        let detail = format!("expected 1 to {MAX_SCHEDULE_REPLAYS}, got {times}");
         return Err(Problem::invalid("times", detail));
     }
     let now = app.config.clock.now();
     let games = app
         .store
-        .request_replays(organiser.actor(), id, times, now)
+        .request_schedule_replays(organiser.actor(), id, times, now)
         .await?;
     tracing::info!(tournament = %id, times, games, "replays queued");
-    let view = replays::champion_shares(&app, id).await?;
+    let view = schedule_replays::champion_shares(&app, id).await?;
     Ok((StatusCode::CREATED, Json((*view).clone())))
 }
 
@@ -58,9 +58,12 @@ pub(crate) async fn cancel_replays(
     PathParam(id): PathParam<TournamentId>,
 ) -> Result<Json<ChampionSharesView>, Problem> {
     let now = app.config.clock.now();
-    let games = app.store.cancel_replays(organiser.actor(), id, now).await?;
+    let games = app
+        .store
+        .cancel_schedule_replays(organiser.actor(), id, now)
+        .await?;
     tracing::info!(tournament = %id, games, "replays cancelled");
-    let view = replays::champion_shares(&app, id).await?;
+    let view = schedule_replays::champion_shares(&app, id).await?;
     Ok(Json((*view).clone()))
 }
 
@@ -73,6 +76,6 @@ pub(crate) async fn certainty(
     State(app): State<App>,
     PathParam(id): PathParam<TournamentId>,
 ) -> Result<Json<ChampionSharesView>, Problem> {
-    let view = replays::champion_shares(&app, id).await?;
+    let view = schedule_replays::champion_shares(&app, id).await?;
     Ok(Json((*view).clone()))
 }
