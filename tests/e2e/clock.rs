@@ -86,7 +86,7 @@ fn server_starts_with_a_clock_before_the_newest_change() {
     fs::remove_file(data.join("clock.json")).expect("the server has recorded its clock");
     clock.set(-86_400);
     let server = Server::start_with_environment(&data, CONFIG, &clock.environment());
-    server.wait_for_log("no evaluation day starts", 1);
+    server.wait_for_log("No evaluation day starts", 1);
     assert!(health_problem(&server).contains("newest change"));
     // A job that was queued in the future.
     let resume = server.post("/api/v1/queue/resume", &server.admin_token, &json!({}));

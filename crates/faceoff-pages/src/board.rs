@@ -103,6 +103,11 @@ impl Downloads {
 }
 
 impl OverallPage {
+    /// Do the rows stand below their tiers? Not if the table is sorted by another column, or the competition has no tiers.
+    fn is_ranked_by_tier(&self) -> bool {
+        self.groups.iter().any(|group| group.tier.is_some())
+    }
+
     /// Text for screen readers after a live update.
     fn live_text(&self) -> String {
         let rows = self.groups.iter().flat_map(|group| &group.rows);
