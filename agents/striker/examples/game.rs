@@ -76,7 +76,7 @@ fn main() -> anyhow::Result<()> {
 /// The player of a name on the command line.
 fn player(name: &str, robot_index: usize) -> anyhow::Result<Player> {
     match name {
-        "hold" => Ok(Player::Hold(None)),
+        "hold" => Ok(Player::hold()),
         "striker" => Ok(Player::agent(Agent::new, robot_index)),
         folder => Ok(Player::Agent(Box::new(Program::start(
             Path::new(folder),

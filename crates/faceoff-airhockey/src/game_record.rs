@@ -96,7 +96,7 @@ pub enum Effect {
     Late,
     /// There was no valid answer: the arm holds its previous position.
     Fault,
-    /// No answer was expected: the arm holds its previous position.
+    /// No answer was expected after a fault in this rally: the arm holds its previous position until the end of the rally.
     Held,
 }
 

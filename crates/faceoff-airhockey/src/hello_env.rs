@@ -5,7 +5,7 @@ use faceoff_sim::{AirHockeyTask, EPISODE_STEPS, EnvInfo, JOINTS, env_info, env_i
 use faceoff_types::{AgentTask, GAME_WINDOWS, UnknownTask, WINDOW_STEPS};
 use serde::Serialize;
 
-/// `env` of `hello`: constants of the simulation, under the names of the challenge's `env_info`.
+/// `env` of `hello`: constants of the simulation, under the names of the `env_info` of the 2023 Robot Air Hockey Challenge.
 /// SI units, radians.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct HelloEnv {
@@ -100,6 +100,7 @@ pub(crate) fn hello_env(agent_task: AgentTask) -> Result<HelloEnv, UnknownTask> 
             (env_info(task), EPISODE_STEPS, task == AirHockeyTask::Hit)
         }
         AgentTask::Game { side } => {
+            // A window is a stretch of 500 control steps, in which each kind of violation counts at most once.
             let steps = GAME_WINDOWS * WINDOW_STEPS;
             (env_info_for(2, side.index()), steps, true)
         }

@@ -3,7 +3,7 @@
 
 use crate::game_record::{RallyReadiness, SideFault};
 use faceoff_episode::{AnswerTiming, TimeSum};
-use faceoff_sim::{ConstraintValues, ViolatedGroups};
+use faceoff_sim::{ConstraintValues, ViolatedConstraints};
 use faceoff_types::{
     AgentFault, AgentTask, ForfeitCause, GameFault, GameLimits, GameWindow, Phase, Side,
     SideOutcome,
@@ -20,7 +20,7 @@ pub(crate) struct RunningSide {
     /// The current window.
     window: GameWindow,
     /// Constraints violated in the current window.
-    violated: ViolatedGroups,
+    violated: ViolatedConstraints,
     window_times: TimeSum,
     /// The windows before the current one.
     windows: Vec<GameWindow>,
@@ -39,7 +39,7 @@ impl RunningSide {
             fault: None,
             needs_start: true,
             window: GameWindow::default(),
-            violated: ViolatedGroups::default(),
+            violated: ViolatedConstraints::default(),
             window_times: TimeSum::default(),
             windows: Vec::new(),
             faults: Vec::new(),

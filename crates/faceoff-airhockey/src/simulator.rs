@@ -6,7 +6,7 @@ use crate::{
     hello_env::hello_env,
     magnitudes::{check_plant_can_be_drawn, perturbation_settings},
 };
-use faceoff_episode::{Conditions, Environment, InvalidConditions, Simulator};
+use faceoff_episode::{Conditions, InvalidConditions, Simulator, WorldFactory};
 use faceoff_sim::{AirHockeyRuleset, PerturbationSettings};
 use faceoff_types::{AgentTask, Competition, InvalidMagnitude, Magnitudes, Seed, UnknownTask};
 use std::sync::{Arc, LazyLock};
@@ -59,10 +59,10 @@ impl Simulator for AirHockey {
         Ok(serde_json::to_string(&env).expect("writing plain data to memory cannot fail"))
     }
 
-    fn environment(
+    fn world_factory(
         &self,
         conditions: &Conditions<'_>,
-    ) -> Result<Box<dyn Environment>, InvalidConditions> {
+    ) -> Result<Box<dyn WorldFactory>, InvalidConditions> {
         Ok(Box::new(simulation_setup(conditions)?))
     }
 

@@ -1,7 +1,7 @@
-//! The world of an episode of a qualifying task.
+//! The world of an episode of a task: hit, defend or prepare.
 
 use crate::simulation_setup::SimulationSetup;
-use faceoff_episode::{Environment, StateColumns, World};
+use faceoff_episode::{StateColumns, World, WorldFactory};
 use faceoff_sim::{ConstraintValues, EPISODE_STEPS, Episode, EpisodeState, Impact, Interpolation};
 use faceoff_types::{ActionLayout, EpisodeEnd, Seed, Task, UnknownTask, Violations};
 use std::any::Any;
@@ -133,7 +133,7 @@ fn put_optional<const N: usize>(columns: &mut dyn StateColumns, values: Option<&
     }
 }
 
-impl Environment for SimulationSetup {
+impl WorldFactory for SimulationSetup {
     fn seed(&self, task: Task, index: u32) -> Seed {
         self.episode_seed(task, index)
     }

@@ -10,7 +10,7 @@ use std::fmt;
 pub enum SecretKind {
     /// A team's API token.
     Team,
-    /// The API token of the host, the person who runs the server.
+    /// The API token of the host: the server's operator, who holds the file `admin-token`.
     Host,
     /// A user's API token.
     User,

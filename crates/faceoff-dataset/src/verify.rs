@@ -80,16 +80,16 @@ pub fn verify(
     }
     let mut reader = EpisodeReader::open(dataset, tasks.clone(), competition)?;
     let mut totals = Totals::new(dataset, &tasks, &reader.steps_of_tasks(), competition);
-    let environment = simulator.environment(&Conditions {
+    let world_factory = simulator.world_factory(&Conditions {
         ruleset: ruleset.ruleset,
         profile: manifest.profile,
         perturbations: &manifest.variation.perturbations,
         seed: manifest.seed,
         mismatch_seed: manifest.mismatch_seed,
     });
-    let environment = environment
+    let world_factory = world_factory
         .map_err(|invalid| DatasetError::Foreign(format!("{MANIFEST_FILE}: {invalid}")))?;
-    let replayer = Replayer::new(ruleset, environment, competition);
+    let replayer = Replayer::new(ruleset, world_factory, competition);
     let pool = ThreadPoolBuilder::new()
         .num_threads(workers.get())
         .thread_name(|index| format!("verify-{index}"))

@@ -11,4 +11,4 @@ mod world;
 pub use record::{AnswerTiming, EpisodeStart, NullSink, RecordError, StepRow, StepSink};
 pub use running_episode::{NonFiniteObservation, Question, RunningEpisode};
 pub use time_sum::TimeSum;
-pub use world::{Conditions, Environment, InvalidConditions, Simulator, StateColumns, World};
+pub use world::{Conditions, InvalidConditions, Simulator, StateColumns, World, WorldFactory};

@@ -53,7 +53,7 @@ pub struct RecordError {
     pub source: Box<dyn std::error::Error + Send + Sync>,
 }
 
-/// Receives the start, the steps and the end of episodes, e.g. to record them.
+/// A *sink*: it receives the start, the steps and the end of episodes, to record them, to compare them with a recording, or to count them.
 pub trait StepSink {
     /// Starts an episode. If the previous episode has not ended, its recording is discarded, since the caller repeats it.
     fn begin(&mut self, start: EpisodeStart<'_>);

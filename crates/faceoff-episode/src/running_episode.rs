@@ -3,7 +3,7 @@
 use crate::{
     record::{AnswerTiming, EpisodeStart, StepRow, StepSink},
     time_sum::TimeSum,
-    world::{Environment, World},
+    world::{World, WorldFactory},
 };
 use faceoff_types::{
     ActionLayout, AgentFault, AgentFaultKind, AgentTask, EpisodeEnd, EpisodeOutcome, Phase, Task,
@@ -92,25 +92,25 @@ impl<S: StepSink> RunningEpisode<S> {
     /// initial state, which is the same for all agents, is recorded nevertheless.
     ///
     /// # Errors
-    /// If the environment has no such task.
+    /// If the factory has no such task.
     pub fn begin(
-        environment: &dyn Environment,
+        world_factory: &dyn WorldFactory,
         task: Task,
         episode: u32,
         layout: Option<ActionLayout>,
         mut sink: S,
     ) -> Result<Self, UnknownTask> {
-        let world = environment.reset(task, episode, layout)?;
+        let world = world_factory.reset(task, episode, layout)?;
         sink.begin(EpisodeStart {
             episode,
-            seed: environment.seed(task, episode),
+            seed: world_factory.seed(task, episode),
             layout,
             world: world.as_ref(),
         });
         Ok(Self {
             task,
             episode,
-            max_steps: environment.max_steps(task),
+            max_steps: world_factory.max_steps(task),
             world,
             times: TimeSum::default(),
             end: None,

@@ -20,7 +20,7 @@ pub trait World: Send + Sync {
     fn divergence(&self) -> Option<String>;
     /// Is the present state a success of the task?
     fn success(&self) -> bool;
-    /// Limits violated so far: all that the competition has, in its order.
+    /// For each kind of violation of the competition, in the order of [`Competition::violations`]: whether it has happened so far.
     fn violations(&self) -> Violations;
     /// Writes the present true state, in the order of the competition's columns
     /// ([`RecordingColumns::state`](faceoff_types::RecordingColumns::state)).
@@ -28,7 +28,7 @@ pub trait World: Send + Sync {
     /// The value of each constraint after the last step: by how much its limit is exceeded. They are in the order of
     /// [`RecordingColumns::limits`](faceoff_types::RecordingColumns::limits). A constraint is violated if its value is above 0.
     fn constraint_values(&self) -> &[f64];
-    /// The world itself, for sinks that know its type.
+    /// The world itself, for receivers of steps ([`StepSink`](crate::StepSink)) that know its type.
     fn as_any(&self) -> &dyn Any;
 }
 
@@ -40,8 +40,8 @@ pub trait StateColumns {
     fn put_absent(&mut self, count: usize);
 }
 
-/// What all episodes of an evaluation have in common. It makes the world of each episode.
-pub trait Environment: Send + Sync {
+/// Makes the world of each episode of an evaluation, from the conditions that all its episodes have in common.
+pub trait WorldFactory: Send + Sync {
     /// The seed of an episode; `index` is its index within the evaluation.
     fn seed(&self, task: Task, index: u32) -> Seed;
     /// Control steps of the longest episode of a task.
@@ -49,7 +49,7 @@ pub trait Environment: Send + Sync {
     /// The world of an episode at its start. `layout` is `None` if the agent failed before it stated one; then no step follows.
     ///
     /// # Errors
-    /// If the environment has no such task.
+    /// If the factory has no such task.
     fn reset(
         &self,
         task: Task,
@@ -93,14 +93,14 @@ pub trait Simulator: fmt::Debug + Send + Sync {
     /// # Errors
     /// If the simulator has no such task.
     fn hello_env(&self, agent_task: AgentTask) -> Result<String, UnknownTask>;
-    /// The environment of an evaluation. It may take milliseconds, so use one for many episodes.
+    /// The factory of the worlds of an evaluation. Making it may take milliseconds, so use one factory for many episodes.
     ///
     /// # Errors
     /// If the simulator has no such ruleset, profile or magnitudes.
-    fn environment(
+    fn world_factory(
         &self,
         conditions: &Conditions<'_>,
-    ) -> Result<Box<dyn Environment>, InvalidConditions>;
+    ) -> Result<Box<dyn WorldFactory>, InvalidConditions>;
     /// Checks that a season with this seed of deviations can be played with magnitudes that are in range, one by one
     /// ([`Competition::check_magnitudes`]). It may take a second.
     ///

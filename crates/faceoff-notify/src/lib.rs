@@ -18,7 +18,8 @@ mod sender;
 mod stage_visibility;
 mod topic;
 
-/// Boxes public async functions, so that they are compiled once here and not by each crate that awaits them.
+/// `#[boxed]` on a public `async fn` makes it return a boxed future, so that its body is compiled once, here, and not in each crate
+/// that awaits it.
 pub(crate) use async_recursion::async_recursion as boxed;
 
 pub use address::{NotPublic, WebhookRules};

@@ -144,7 +144,7 @@ const fn changes_queue(event: &Event) -> bool {
             | Event::EvaluationPlatformFailed { .. }
             | Event::EvaluationCancelled { .. }
             | Event::EvaluationDeadlineMissed { .. }
-            | Event::AblationOrdered { .. }
+            | Event::AblationRequested { .. }
             | Event::AblationFinished
             | Event::AblationFailed { .. }
             | Event::ProposalMade { .. }

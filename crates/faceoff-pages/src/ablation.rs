@@ -6,7 +6,7 @@ pub(super) mod pair;
 use super::{
     assets,
     chart::{LabelledRate, RateChart},
-    figures,
+    format,
     frame::{Frame, PageProblem, render},
 };
 use askama::Template;
@@ -159,17 +159,17 @@ impl Row {
         Self {
             profile: effect.profile,
             letter: letter(effect.profile, competition),
-            percent: figures::one_decimal(100.0 * effect.success_rate),
-            low: figures::one_decimal(100.0 * low),
-            high: figures::one_decimal(100.0 * high),
+            percent: format::one_decimal(100.0 * effect.success_rate),
+            low: format::one_decimal(100.0 * low),
+            high: format::one_decimal(100.0 * high),
             successes: effect.successes,
             episodes: effect.episodes,
-            penalty_points: figures::one_decimal(effect.penalty_points),
+            penalty_points: format::one_decimal(effect.penalty_points),
             difference: (effect.profile != competition.ideal_profile).then(|| Difference {
-                points: figures::signed(100.0 * effect.difference),
+                points: format::signed(100.0 * effect.difference),
                 lost: effect.lost,
                 gained: effect.gained,
-                p_value: figures::p_value(effect.p_value),
+                p_value: format::p_value(effect.p_value),
                 is_significant: effect.p_value <= SIGNIFICANCE,
             }),
         }

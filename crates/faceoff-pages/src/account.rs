@@ -1,7 +1,7 @@
 //! `/account`: the signed-in user with their tokens and sessions.
 
 use super::{
-    figures::expiry_state,
+    format::expiry_state,
     frame::{Frame, PageProblem, render},
 };
 use askama::Template;

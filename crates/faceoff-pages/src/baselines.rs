@@ -1,6 +1,6 @@
 //! The section of *baselines* on the pages of the boards: reference agents of the organisers, which are evaluated but not ranked.
 
-use super::figures::{self, Rate};
+use super::format::{self, Rate};
 use faceoff_api::views::{baseline::BaselineRow, board::BoardView};
 use faceoff_types::{EvaluationId, Task, Tier};
 use jiff::civil::Date;
@@ -41,8 +41,8 @@ pub(super) fn rows(board: &BoardView) -> Vec<Baseline> {
             rates: tasks
                 .map(|(task, result)| (*task, Rate::new(result)))
                 .collect(),
-            penalty_points: figures::one_decimal(points),
-            score: figures::one_decimal(row.score),
+            penalty_points: format::one_decimal(points),
+            score: format::one_decimal(row.score),
         }
     };
     board.baselines.iter().map(row).collect()

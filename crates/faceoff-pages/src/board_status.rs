@@ -1,6 +1,6 @@
 //! Status of boards and stages as text: which results count, who sees them, and whether they are final.
 
-use super::figures::utc_minute;
+use super::format::utc_minute;
 use faceoff_api::views::{
     board::{BoardRow, BoardView},
     stage::PhaseView,

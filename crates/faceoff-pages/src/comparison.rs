@@ -4,7 +4,7 @@
 pub(super) mod pair;
 
 use super::{
-    figures,
+    format,
     frame::{Frame, PageProblem, render},
 };
 use askama::Template;
@@ -34,10 +34,10 @@ impl Difference {
     /// Values in percentage points.
     fn new(value: f64, ci95: [f64; 2], p: f64, is_significant: bool, names: [&str; 2]) -> Self {
         Self {
-            value: figures::signed(value),
-            low: figures::signed(ci95[0]),
-            high: figures::signed(ci95[1]),
-            p_value: figures::p_value(p),
+            value: format::signed(value),
+            low: format::signed(ci95[0]),
+            high: format::signed(ci95[1]),
+            p_value: format::p_value(p),
             verdict: match (is_significant, value > 0.0) {
                 (false, _) => "statistically tied".to_owned(),
                 (true, true) => format!("{} is ahead", names[0]),
@@ -119,8 +119,8 @@ pub(super) async fn page(
             only_a: comparison.only_a,
             only_b: comparison.only_b,
             neither: comparison.neither,
-            rate_a: figures::one_decimal(100.0 * comparison.success_rate_a),
-            rate_b: figures::one_decimal(100.0 * comparison.success_rate_b),
+            rate_a: format::one_decimal(100.0 * comparison.success_rate_a),
+            rate_b: format::one_decimal(100.0 * comparison.success_rate_b),
             difference: Difference::new(
                 100.0 * comparison.difference,
                 comparison.difference_ci95.map(|bound| 100.0 * bound),
@@ -134,8 +134,8 @@ pub(super) async fn page(
     render(&Page {
         frame: Frame::load(&app, "").await?,
         rows,
-        score_a: figures::one_decimal(overall.score_a),
-        score_b: figures::one_decimal(overall.score_b),
+        score_a: format::one_decimal(overall.score_a),
+        score_b: format::one_decimal(overall.score_b),
         overall: Difference::new(
             overall.difference,
             overall.difference_ci95,

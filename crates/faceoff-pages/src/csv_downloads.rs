@@ -62,7 +62,7 @@ pub(super) async fn episodes(
             let violation = summary
                 .violations
                 .iter()
-                .find(|violation| violation.group == *name);
+                .find(|violation| violation.constraint == *name);
             row.extend([
                 or_empty(violation.map(|violation| violation.from)),
                 or_empty(violation.map(|violation| violation.samples)),

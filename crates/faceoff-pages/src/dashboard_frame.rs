@@ -1,7 +1,7 @@
 //! Frame of the team dashboard and the organiser dashboard: tabs, notices, style and script.
 
 use super::{
-    assets, figures,
+    assets, format,
     frame::{PageProblem, render},
 };
 use askama::Template;
@@ -86,7 +86,7 @@ impl From<&Problem> for Refusal {
     fn from(problem: &Problem) -> Self {
         Self {
             title: problem.kind().title(),
-            detail: figures::sentence(problem.detail()),
+            detail: format::sentence(problem.detail()),
             slug: problem.kind().slug(),
         }
     }

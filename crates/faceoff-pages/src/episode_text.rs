@@ -1,17 +1,18 @@
 //! Outcomes and violations of episodes as text. A *violation* is a control step or more in which the robot exceeds a safety limit.
 
 use faceoff_replay::{
-    Contact, ContactWith, EpisodeLine, Group, LOST_PUCK, OWN_GOAL, SLOW_GOAL, ViolationSummary,
+    Constraint, Contact, ContactWith, EpisodeLine, LOST_PUCK, OWN_GOAL, SLOW_GOAL,
+    ViolationSummary,
     model::{PUCK, TABLE},
 };
 use faceoff_types::{Competition, EpisodeEnd};
 
-pub(super) const fn group_label(group: Group) -> &'static str {
-    match group {
-        Group::Ee => "end effector",
-        Group::Link => "elbow, wrist",
-        Group::JointPos => "joint position",
-        Group::JointVel => "joint velocity",
+pub(super) const fn constraint_label(constraint: Constraint) -> &'static str {
+    match constraint {
+        Constraint::Ee => "end effector",
+        Constraint::Link => "elbow, wrist",
+        Constraint::JointPos => "joint position",
+        Constraint::JointVel => "joint velocity",
     }
 }
 
@@ -20,13 +21,13 @@ pub(super) fn describe_violation(
     competition: &Competition,
     violation: &ViolationSummary,
 ) -> String {
-    let group = Group::ALL
+    let constraint = Constraint::ALL
         .into_iter()
-        .find(|group| group.name() == violation.group);
-    let excess = match group {
-        Some(Group::Ee | Group::Link) => excess_text(1e3 * violation.worst, 1, "mm"),
-        Some(Group::JointPos) => excess_text(violation.worst, 4, "rad"),
-        Some(Group::JointVel) => excess_text(violation.worst, 3, "rad/s"),
+        .find(|constraint| constraint.name() == violation.constraint);
+    let excess = match constraint {
+        Some(Constraint::Ee | Constraint::Link) => excess_text(1e3 * violation.worst, 1, "mm"),
+        Some(Constraint::JointPos) => excess_text(violation.worst, 4, "rad"),
+        Some(Constraint::JointVel) => excess_text(violation.worst, 3, "rad/s"),
         None => format!("up to {:.3}", violation.worst),
     };
     let joint = match violation.joint {
@@ -35,7 +36,7 @@ pub(super) fn describe_violation(
     };
     format!(
         "{}{joint}: by {excess}, from step {}, for {} {}",
-        competition.violation_title(violation.group),
+        competition.violation_title(violation.constraint),
         violation.from,
         violation.samples,
         if violation.samples == 1 {

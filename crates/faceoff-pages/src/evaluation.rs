@@ -5,7 +5,7 @@ mod slow_answers;
 
 use super::{
     chart::{AnswerTimeChart, TimeBin, TimeSummary},
-    figures,
+    format,
     frame::{Frame, PageProblem, render},
 };
 use askama::Template;
@@ -29,7 +29,7 @@ use faceoff_types::{
     Competition, EvaluationId, Profile, RoundTrips, Seed, SlotTiming, StageDay, Task, TaskMap,
     Tier, ViolationCounts, ViolationInfo,
 };
-use figures::{Rate, TierLabel, utc_minute};
+use format::{Rate, TierLabel, utc_minute};
 use jiff::{Timestamp, civil};
 use slow_answers::SlowAnswers;
 
@@ -62,7 +62,7 @@ struct TaskDetails {
 fn tier_change(summary: &EpisodeSummary, task: Option<Task>) -> String {
     summary
         .tier_change_of(task)
-        .map_or_else(String::new, figures::probability)
+        .map_or_else(String::new, format::probability)
 }
 
 impl TaskFigures {
@@ -77,8 +77,8 @@ impl TaskFigures {
             rate: Rate::new(result),
             successes: result.successes,
             episodes: result.episodes,
-            penalty_points: figures::one_decimal(result.penalty_points),
-            per_episode: figures::per_episode(result.penalty_points, result.episodes),
+            penalty_points: format::one_decimal(result.penalty_points),
+            per_episode: format::per_episode(result.penalty_points, result.episodes),
             tier: result.tier,
             tier_change: tier_change(summary, Some(task)),
             details: TaskDetails::new(result, competition),
@@ -115,8 +115,8 @@ impl ViolationFigures {
             *points = (result.penalty_points - fixed).max(0.0);
         }
         let figures = kinds.into_iter().map(|(_, count, points)| Self {
-            share: figures::count_with_share(count, result.episodes),
-            points: (count > 0).then(|| figures::one_decimal(points)),
+            share: format::count_with_share(count, result.episodes),
+            points: (count > 0).then(|| format::one_decimal(points)),
         });
         figures.collect()
     }
@@ -128,9 +128,9 @@ impl TaskDetails {
         Some(Self {
             steps: result.steps?,
             violations: ViolationFigures::by_kind(result, violations, competition),
-            mean_ms: figures::milliseconds(time.mean),
-            p99_ms: figures::milliseconds(time.p99),
-            max_ms: figures::milliseconds(time.max),
+            mean_ms: format::milliseconds(time.mean),
+            p99_ms: format::milliseconds(time.p99),
+            max_ms: format::milliseconds(time.max),
         })
     }
 }
@@ -189,15 +189,15 @@ impl TimingFigures {
     fn new(timing: &SlotTiming) -> Self {
         let figures = |trips: RoundTrips| RoundTripFigures {
             count: trips.count,
-            p50_ms: figures::precise_milliseconds(trips.p50),
-            p99_ms: figures::precise_milliseconds(trips.p99),
-            max_ms: figures::precise_milliseconds(trips.max),
+            p50_ms: format::precise_milliseconds(trips.p50),
+            p99_ms: format::precise_milliseconds(trips.p99),
+            max_ms: format::precise_milliseconds(trips.max),
         };
         Self {
             before: figures(timing.before_s),
             during: figures(timing.during_s),
             longest_stall_ms: (timing.longest_stall_s > 0.0)
-                .then(|| figures::milliseconds(timing.longest_stall_s)),
+                .then(|| format::milliseconds(timing.longest_stall_s)),
             host_noise_reruns: timing.host_noise_reruns,
             platform_retries: timing.platform_retries,
         }
@@ -209,7 +209,7 @@ impl TimingFigures {
 struct Page {
     frame: Frame,
     /// Heading and points of each kind of violation.
-    violation_headers: Vec<figures::ViolationHeader>,
+    violation_headers: Vec<format::ViolationHeader>,
     id: EvaluationId,
     team: String,
     agent: Option<String>,
@@ -288,7 +288,7 @@ pub(super) async fn page(
         _ => None,
     };
     render(&Page {
-        violation_headers: figures::violation_headers(app.config.competition()),
+        violation_headers: format::violation_headers(app.config.competition()),
         frame: Frame::load(&app, "")
             .await?
             .located(&app, &format!("/evaluations/{id}"))
@@ -399,7 +399,7 @@ async fn comparable_evaluations(
         .map(|(score, team, evaluation)| OtherEvaluation {
             team: team.to_string(),
             evaluation,
-            score: figures::one_decimal(score),
+            score: format::one_decimal(score),
         })
         .collect())
 }
@@ -457,7 +457,7 @@ impl FinalResult {
         let weights = competition.weights(&result.variation);
         Self {
             score: Rate::of_score(result.score, &result.tasks, &weights),
-            penalty_points: figures::one_decimal(result.penalty_points),
+            penalty_points: format::one_decimal(result.penalty_points),
             tier: result
                 .tier
                 .zip(competition.tier_bounds(&result.variation))

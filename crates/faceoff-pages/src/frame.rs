@@ -1,6 +1,6 @@
 //! The frame of every page (header, navigation and footer), and the rendering of pages and of problems.
 
-use super::{assets, figures, signed_in::SignedIn};
+use super::{assets, format, signed_in::SignedIn};
 use askama::Template;
 use axum::{
     http::{HeaderValue, header},
@@ -197,7 +197,7 @@ impl ServerFault {
     pub(super) fn of(problem: &Problem) -> Self {
         Self {
             title: problem.kind().title(),
-            detail: figures::sentence(problem.detail()),
+            detail: format::sentence(problem.detail()),
         }
     }
 }
@@ -226,7 +226,7 @@ impl IntoResponse for PageProblem {
         let page = ProblemPage {
             frame: Frame::new(String::new(), ""),
             title: kind.title(),
-            detail: figures::sentence(self.0.detail()),
+            detail: format::sentence(self.0.detail()),
             status: kind.status().as_u16(),
         };
         match page.render() {

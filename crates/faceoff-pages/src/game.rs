@@ -6,7 +6,7 @@ mod replay;
 mod score_timeline;
 
 use super::{
-    assets, figures,
+    assets, format,
     frame::{Frame, PageProblem, render},
     spoilers::Spoilers,
     table_drawing::TableOutline,
@@ -198,7 +198,7 @@ impl GameResult {
         let statistic = |name, sides: [String; 2]| Statistic { name, sides };
         let counts = |name, sides: [u32; 2]| statistic(name, sides.map(|count| count.to_string()));
         let milliseconds = |seconds: [f64; 2]| {
-            seconds.map(|seconds| format!("{} ms", figures::milliseconds(seconds)))
+            seconds.map(|seconds| format!("{} ms", format::milliseconds(seconds)))
         };
         let times = &result.computation_time_s;
         let statistics = vec![
@@ -206,7 +206,7 @@ impl GameResult {
             counts("Fouls", result.fouls),
             statistic(
                 "Penalty points",
-                result.penalty_points.map(figures::one_decimal),
+                result.penalty_points.map(format::one_decimal),
             ),
             statistic(
                 "Tier",
@@ -227,7 +227,7 @@ impl GameResult {
             score: result.score,
             winner: result.winner.as_ref().map(ToString::to_string),
             reason: result.because.clone(),
-            duration_min: figures::one_decimal(f64::from(result.steps) * CONTROL_STEP_S / 60.0),
+            duration_min: format::one_decimal(f64::from(result.steps) * CONTROL_STEP_S / 60.0),
             statistics,
         }
     }

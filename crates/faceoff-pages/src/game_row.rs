@@ -1,6 +1,6 @@
 //! A row of a list of games, with the state of the game as text.
 
-use super::figures::utc_minute;
+use super::format::utc_minute;
 use faceoff_api::views::game::{GameStatus, GameView, PurposeView};
 use faceoff_types::{GameId, RoundNumber, TeamId, TeamName};
 

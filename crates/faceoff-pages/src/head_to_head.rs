@@ -1,7 +1,7 @@
 //! `/tournaments/{id}/teams/{a}/{b}`: comparison of two teams of a tournament, with their games.
 
 use super::{
-    figures,
+    format,
     frame::{Frame, PageProblem, render},
     game_row::GameRow,
     spoilers::Spoilers,
@@ -181,7 +181,7 @@ fn statistics(played: &[(&GameRow, &GameResultView)], names: &[TeamName; 2]) -> 
         ),
         statistic(
             "Penalty points",
-            both(&|result, side| result.penalty_points[side]).map(figures::one_decimal),
+            both(&|result, side| result.penalty_points[side]).map(format::one_decimal),
         ),
         statistic(
             "Faults",
@@ -189,7 +189,7 @@ fn statistics(played: &[(&GameRow, &GameResultView)], names: &[TeamName; 2]) -> 
         ),
         statistic(
             "Mean computation time",
-            mean.map(|sum| format!("{} ms", figures::milliseconds(sum / steps.max(1.0)))),
+            mean.map(|sum| format!("{} ms", format::milliseconds(sum / steps.max(1.0)))),
         ),
     ]
 }
@@ -210,8 +210,8 @@ impl GameStatistics {
         Self {
             goals: pair(result.goals.map(|goals| goals.to_string())),
             fouls: pair(result.fouls.map(|fouls| fouls.to_string())),
-            penalty_points: pair(result.penalty_points.map(figures::one_decimal)),
-            mean_ms: pair([times[0].mean, times[1].mean].map(figures::milliseconds)),
+            penalty_points: pair(result.penalty_points.map(format::one_decimal)),
+            mean_ms: pair([times[0].mean, times[1].mean].map(format::milliseconds)),
             game: game.clone(),
         }
     }

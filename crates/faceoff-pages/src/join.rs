@@ -1,7 +1,7 @@
 //! `/join/CODE`: accepting an invitation. The code is the secret of the link.
 
 use super::{
-    figures,
+    format,
     frame::{Frame, PageProblem, render},
     sign_in::redirect_to_dashboard,
 };
@@ -187,7 +187,7 @@ pub(super) async fn submit(
         }
         Err(PageProblem(problem)) if problem.kind().status().is_client_error() => {
             let status = problem.kind().status();
-            let error = Some(figures::sentence(problem.detail()));
+            let error = Some(format::sentence(problem.detail()));
             let page = page_with(&app, &code, form, error).await?;
             Ok((status, page).into_response())
         }

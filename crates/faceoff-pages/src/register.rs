@@ -1,7 +1,7 @@
 //! `/register`: registration of a team.
 
 use super::{
-    figures,
+    format,
     frame::{Frame, PageProblem, render},
     join::{parse_accepted_terms, parse_team},
 };
@@ -96,7 +96,7 @@ pub(super) async fn submit(
         }
         Err(problem) if problem.kind().status().is_client_error() => {
             let status = problem.kind().status();
-            let error = Some(figures::sentence(problem.detail()));
+            let error = Some(format::sentence(problem.detail()));
             let page = page_with(&app, form, error, None).await?;
             Ok((status, page).into_response())
         }

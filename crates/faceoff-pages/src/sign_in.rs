@@ -1,7 +1,7 @@
 //! `/sign-in` and `/sign-out`: starting and ending a browser session.
 
 use super::{
-    figures,
+    format,
     frame::{Frame, PageProblem, render},
     kept_form::{self, KeptForm},
     page_auth::return_path,
@@ -135,7 +135,7 @@ pub(super) async fn submit(
             ) =>
         {
             let status = problem.kind().status();
-            let error = Some(figures::sentence(problem.detail()));
+            let error = Some(format::sentence(problem.detail()));
             let return_path = valid_return_path(&form.next);
             let page = page_with(&app, form.name, error, return_path, form.kept).await?;
             Ok((status, page).into_response())

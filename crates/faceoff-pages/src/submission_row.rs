@@ -1,6 +1,6 @@
 //! A row of a list of submissions: an uploaded agent with its state, and the actions that are possible.
 
-use super::{dashboard_frame, figures::utc_minute};
+use super::{dashboard_frame, format::utc_minute};
 use faceoff_api::views::submission::{SubmissionStatus, SubmissionView};
 use faceoff_types::SubmissionId;
 

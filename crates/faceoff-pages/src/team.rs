@@ -48,7 +48,7 @@ struct Page {
     /// The newest first.
     days: Vec<DayResult>,
     violations: Vec<TaskViolations>,
-    violation_headers: Vec<crate::figures::ViolationHeader>,
+    violation_headers: Vec<crate::format::ViolationHeader>,
     /// Running and queued evaluations of today.
     open_evaluations: Vec<EvaluationView>,
     /// Visible to the team and organisers only.
@@ -125,7 +125,7 @@ pub(super) async fn page(
             .map(|info| info.title.clone())
             .collect(),
         day_charts: days::charts(&history.rows, &variation, app.config.competition()),
-        violation_headers: crate::figures::violation_headers(app.config.competition()),
+        violation_headers: crate::format::violation_headers(app.config.competition()),
         violations: days::violations(&history.rows, app.config.competition()),
         days: history
             .rows

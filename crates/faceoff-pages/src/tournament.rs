@@ -263,7 +263,7 @@ impl ChampionShares {
             return None;
         }
         let champions = view.champions.iter().map(|share| {
-            let percent = |share: f64| super::figures::one_decimal(100.0 * share);
+            let percent = |share: f64| super::format::one_decimal(100.0 * share);
             let [low, high] = share.share_ci95.map(percent);
             (
                 share.team.clone(),

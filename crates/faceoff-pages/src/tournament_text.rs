@@ -1,6 +1,6 @@
 //! Tournaments as text.
 
-use super::figures;
+use super::format;
 use faceoff_api::views::tournament::{TournamentHead, TournamentPhase};
 use faceoff_replay::model::CONTROL_STEP_S;
 use faceoff_types::{DepartureKind, RoundNumber, TournamentFormat, TournamentRules};
@@ -47,7 +47,7 @@ pub(super) fn describe_format(rules: &TournamentRules) -> String {
     } else {
         ""
     };
-    let minutes = figures::one_decimal(f64::from(rules.steps) * CONTROL_STEP_S / 60.0);
+    let minutes = format::one_decimal(f64::from(rules.steps) * CONTROL_STEP_S / 60.0);
     format!(
         "{format}{mirrored}. A game lasts {minutes} min ({} control steps), perturbation profile {}.",
         group_digits(rules.steps),

@@ -1,13 +1,13 @@
-//! Positions of violations of safety limits on the table, with its own mark for each group of limits: end effector, elbow and wrist, joint
+//! Positions of violations of safety limits on the table, with its own mark for each constraint: end effector, elbow and wrist, joint
 //! positions, joint velocities.
 
 use super::{
-    episode_text::group_label,
+    episode_text::constraint_label,
     table_drawing::{self, Position},
 };
-use faceoff_replay::Group;
+use faceoff_replay::Constraint;
 
-/// Marks of the violations of a group.
+/// Marks of the violations of a constraint.
 pub(super) struct ViolationMarks {
     pub(super) label: &'static str,
     pub(super) class: &'static str,
@@ -18,24 +18,24 @@ pub(super) struct ViolationMarks {
 }
 
 impl ViolationMarks {
-    /// Marks of each group with violations.
-    pub(super) fn by_group(positions: impl Fn(Group) -> Vec<Position>) -> Vec<Self> {
-        let groups = Group::ALL.into_iter().filter_map(|group| {
-            let found = positions(group);
-            let (class, draw): (_, fn(&[Position]) -> String) = match group {
-                Group::Ee => ("ee", table_drawing::crosses),
-                Group::Link => ("link", table_drawing::squares),
-                Group::JointPos => ("joint-pos", table_drawing::dots),
-                Group::JointVel => ("joint-vel", table_drawing::triangles),
+    /// Marks of each constraint with violations.
+    pub(super) fn by_constraint(positions: impl Fn(Constraint) -> Vec<Position>) -> Vec<Self> {
+        let constraints = Constraint::ALL.into_iter().filter_map(|constraint| {
+            let found = positions(constraint);
+            let (class, draw): (_, fn(&[Position]) -> String) = match constraint {
+                Constraint::Ee => ("ee", table_drawing::crosses),
+                Constraint::Link => ("link", table_drawing::squares),
+                Constraint::JointPos => ("joint-pos", table_drawing::dots),
+                Constraint::JointVel => ("joint-vel", table_drawing::triangles),
             };
             (!found.is_empty()).then(|| Self {
-                label: group_label(group),
+                label: constraint_label(constraint),
                 class,
                 marks: draw(&found),
                 symbol: draw(&[[0.0; 2]]),
                 count: found.len(),
             })
         });
-        groups.collect()
+        constraints.collect()
     }
 }

@@ -28,7 +28,8 @@ pub enum ActionMode {
     Raw,
 }
 
-/// Format of an environment's actions.
+/// Format of the actions of a Gymnasium environment, from which the action for the evaluator is made. The interpolation decides
+/// the layout of both.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ActionFormat {
     /// Meaning of their numbers.

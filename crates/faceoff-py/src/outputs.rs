@@ -12,7 +12,7 @@ use rayon::prelude::*;
 /// Count of numbers in a world's row of facts; see [`write_facts`].
 pub const FACTS: usize = 12;
 
-/// Rows of all worlds, or of consecutive ones.
+/// The output arrays: the rows of all worlds, or of consecutive ones.
 pub struct Outputs<'a> {
     /// Count of numbers in an observation.
     pub observation_len: usize,
@@ -118,7 +118,7 @@ pub fn write_facts(world: &World, constraints: &[f64; 4], facts: &mut [f64]) {
         .and_then(code)
         .map_or(-1.0, |(code, _): (u8, _)| f64::from(code));
     facts[1] = f64::from(u8::from(world.succeeds()));
-    facts[2] = f64::from(world.origin.number);
+    facts[2] = f64::from(world.episode_start.number);
     facts[3] = f64::from(world.episode.steps());
     facts[4..8].copy_from_slice(constraints);
     for (fact, is_violated) in facts[8..].iter_mut().zip([
@@ -131,8 +131,8 @@ pub fn write_facts(world: &World, constraints: &[f64; 4], facts: &mut [f64]) {
     }
 }
 
-/// Rows in memory of this crate, for a step that runs in the background.
-pub struct OwnedRows {
+/// Output arrays in memory of this crate, for a step that runs in the background.
+pub struct OwnedOutputs {
     observation_len: usize,
     observations: Vec<f32>,
     final_observations: Vec<f32>,
@@ -144,7 +144,7 @@ pub struct OwnedRows {
     next_states: Vec<f64>,
 }
 
-impl OwnedRows {
+impl OwnedOutputs {
     /// Zeroed rows for `worlds` worlds; true states only if requested.
     pub fn new(setup: &Setup, worlds: usize, states: bool) -> Self {
         let observation_len = setup.observation_len();
@@ -162,8 +162,8 @@ impl OwnedRows {
         }
     }
 
-    /// The rows for writing.
-    pub fn rows(&mut self) -> Outputs<'_> {
+    /// The arrays for writing.
+    pub fn outputs(&mut self) -> Outputs<'_> {
         Outputs {
             observation_len: self.observation_len,
             observations: &mut self.observations,

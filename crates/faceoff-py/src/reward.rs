@@ -2,7 +2,7 @@
 
 use faceoff_scoring::tournament::{EE_POINTS, JOINT_POS_POINTS, JOINT_VEL_POINTS, LINK_POINTS};
 use faceoff_sim::AirHockeyTask;
-use faceoff_sim::{Episode, ViolatedGroups, table::geometry::TABLE};
+use faceoff_sim::{Episode, ViolatedConstraints, table::geometry::TABLE};
 
 /// Reward of a success at the episode's end.
 pub const SUCCESS: f64 = 10.0;
@@ -30,7 +30,7 @@ pub fn potential(task: AirHockeyTask, episode: &Episode) -> f64 {
 }
 
 /// Penalty points of the constraints whose first violation in this episode was in the last step.
-pub fn new_points(before: ViolatedGroups, after: ViolatedGroups) -> f64 {
+pub fn new_points(before: ViolatedConstraints, after: ViolatedConstraints) -> f64 {
     [
         (before.ee, after.ee, EE_POINTS),
         (before.link, after.link, LINK_POINTS),

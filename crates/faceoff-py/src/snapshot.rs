@@ -3,7 +3,7 @@
 use crate::{
     errors::{argument_error, catch_panic, check_version},
     setup::Setup,
-    world::{Origin, World, check_puck},
+    world::{EpisodeStart, World, check_puck},
 };
 use pyo3::{
     prelude::*,
@@ -38,13 +38,13 @@ impl Snapshot {
     /// The seed of the world.
     #[getter]
     fn seed(&self) -> u64 {
-        self.world.origin.seed
+        self.world.episode_start.seed
     }
 
     /// The episode's number.
     #[getter]
     fn episode_number(&self) -> u32 {
-        self.world.origin.number
+        self.world.episode_start.number
     }
 
     /// Control steps after which the episode is truncated.
@@ -63,8 +63,8 @@ impl Snapshot {
         format!(
             "<state of {}: seed {}, episode {}, step {}>",
             self.setup.task,
-            self.world.origin.seed,
-            self.world.origin.number,
+            self.world.episode_start.seed,
+            self.world.episode_start.number,
             self.world.episode.steps()
         )
     }
@@ -85,9 +85,9 @@ impl Snapshot {
         let saved = SavedState {
             faceoff: env!("CARGO_PKG_VERSION").to_owned(),
             setup: Setup::clone(&self.setup),
-            seed: self.world.origin.seed,
-            episode: self.world.origin.number,
-            puck: self.world.origin.puck,
+            seed: self.world.episode_start.seed,
+            episode: self.world.episode_start.number,
+            puck: self.world.episode_start.puck,
             actions: self.world.actions.clone(),
         };
         let json = serde_json::to_vec(&saved)
@@ -109,12 +109,13 @@ pub fn load_snapshot(py: Python<'_>, data: &[u8]) -> PyResult<Snapshot> {
     if let Some(puck) = &saved.puck {
         check_puck(setup.task, puck)?;
     }
-    let origin = Origin {
+    let episode_start = EpisodeStart {
         seed: saved.seed,
         number: saved.episode,
         puck: saved.puck,
     };
-    let world = py.detach(|| catch_panic(|| World::replay(&setup, origin, saved.actions)))?;
+    let world =
+        py.detach(|| catch_panic(|| World::replay(&setup, episode_start, saved.actions)))?;
     Ok(Snapshot {
         setup: Arc::new(setup),
         world,

@@ -3,7 +3,7 @@
 use crate::{errors::argument_error, reward, setup::Setup};
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
-    Episode, EpisodeState, JOINTS, Plant, StepOutcome, ViolatedGroups, model::INITIAL_Q,
+    Episode, EpisodeState, JOINTS, Plant, StepOutcome, ViolatedConstraints, model::INITIAL_Q,
 };
 use faceoff_types::{EpisodeEnd, Seed};
 use pyo3::prelude::*;
@@ -13,9 +13,9 @@ use std::sync::Arc;
 /// each), the end effector's 3, and the 3 of the opponent's, zero without one, each in its robot's base frame.
 pub const STATE_LEN: usize = 6 + 3 * JOINTS + 6;
 
-/// What an episode starts from; two episodes with the same origin and setup start equally.
+/// The seed, number and puck from which an episode starts. Two episodes with the same ones and the same setup start equally.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Origin {
+pub struct EpisodeStart {
     /// The number from which the episode's seeds are derived.
     pub seed: u64,
     /// The episode's number in an evaluation with that seed.
@@ -29,8 +29,7 @@ pub struct Origin {
 pub struct World {
     /// The simulated episode.
     pub episode: Episode,
-    /// What the episode started from.
-    pub origin: Origin,
+    pub episode_start: EpisodeStart,
     /// Last commanded joint positions, rad.
     pub commanded: [f64; JOINTS],
     /// All actions since the episode's start, as passed by the caller.
@@ -41,7 +40,7 @@ pub struct World {
     plant: Arc<Plant>,
     /// The reward's potential of the present state, points; the next reward contains its change.
     potential: f64,
-    violations: ViolatedGroups,
+    violations: ViolatedConstraints,
 }
 
 /// Results of a world's step.
@@ -56,17 +55,18 @@ pub struct StepResult {
 impl World {
     /// A world at the start of an episode. Drawing a plant takes milliseconds; the plant of `previous` is used if it has
     /// the same seed.
-    pub fn start(setup: &Setup, origin: Origin, previous: Option<&Self>) -> Self {
-        let seed = Seed::from_number(origin.seed);
+    pub fn start(setup: &Setup, episode_start: EpisodeStart, previous: Option<&Self>) -> Self {
+        let seed = Seed::from_number(episode_start.seed);
         let plant = match previous {
             Some(previous)
-                if previous.origin.seed == origin.seed || setup.mismatch_seed.is_some() =>
+                if previous.episode_start.seed == episode_start.seed
+                    || setup.mismatch_seed.is_some() =>
             {
                 Arc::clone(&previous.plant)
             }
             _ => Arc::new(setup.plant(seed)),
         };
-        let episode = setup.episode(&plant, seed, origin.number, origin.puck);
+        let episode = setup.episode(&plant, seed, episode_start.number, episode_start.puck);
         Self {
             potential: reward::potential(setup.task, &episode),
             violations: episode.violations(),
@@ -74,19 +74,19 @@ impl World {
             actions: Vec::new(),
             end: None,
             episode,
-            origin,
+            episode_start,
             plant,
         }
     }
 
     /// Starts the next episode of the same seed.
     pub fn start_next(&mut self, setup: &Setup) {
-        let origin = Origin {
-            seed: self.origin.seed,
-            number: self.origin.number.wrapping_add(1),
+        let episode_start = EpisodeStart {
+            seed: self.episode_start.seed,
+            number: self.episode_start.number.wrapping_add(1),
             puck: None,
         };
-        *self = Self::start(setup, origin, Some(self));
+        *self = Self::start(setup, episode_start, Some(self));
     }
 
     /// Updates the world after a step of its episode, and returns the step's results.
@@ -123,7 +123,7 @@ impl World {
     ///
     /// # Errors
     /// If the actions are not those of a possible episode.
-    pub fn replay(setup: &Setup, origin: Origin, actions: Vec<f64>) -> PyResult<Self> {
+    pub fn replay(setup: &Setup, episode_start: EpisodeStart, actions: Vec<f64>) -> PyResult<Self> {
         let action_format = setup.action_format();
         let len = action_format.len();
         let max_len = len * setup.max_episode_steps as usize;
@@ -135,7 +135,7 @@ impl World {
             ));
         }
         action_format.check(&actions, |index| format!(" of the state's action {index}"))?;
-        let mut world = Self::start(setup, origin, None);
+        let mut world = Self::start(setup, episode_start, None);
         let mut command = vec![0.0; len];
         for (step, action) in actions.chunks_exact(len).enumerate() {
             if world.end.is_some() {

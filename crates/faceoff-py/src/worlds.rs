@@ -5,13 +5,13 @@ use crate::{
         OrderError, argument_error, borrow_mut, catch_panic, closed_error, missing_reset_error,
         panic_message, simulator_error,
     },
-    outputs::{OwnedRows, chunks_with_worlds},
+    output_arrays::OutputArrays,
+    outputs::{OwnedOutputs, chunks_with_worlds},
     pool::{Pool, pool_if_parallel},
-    rows::Rows,
     setup::Setup,
     snapshot::Snapshot,
     step::{Autoreset, step},
-    world::{Origin, World, check_puck},
+    world::{EpisodeStart, World, check_puck},
 };
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -58,7 +58,7 @@ struct SentStep {
 }
 
 /// Worlds after a step, and its results.
-type StepOutput = (Vec<World>, OwnedRows);
+type StepOutput = (Vec<World>, OwnedOutputs);
 
 #[pymethods]
 impl Worlds {
@@ -86,7 +86,7 @@ impl Worlds {
         seeds: Vec<Option<u64>>,
         number: Option<u32>,
         puck: Option<[f64; 6]>,
-        mut rows: Rows<'_>,
+        mut rows: OutputArrays<'_>,
     ) -> PyResult<()> {
         let this = &mut *borrow_mut(slf)?;
         let setup = &*this.setup;
@@ -105,10 +105,10 @@ impl Worlds {
                 "reset: expected a reset of all worlds first, got one of some",
             ));
         }
-        let origin = |index: usize, world: Option<&World>| Origin {
-            seed: seeds[index].unwrap_or_else(|| world.map_or(0, |world| world.origin.seed)),
+        let episode_start = |index: usize, world: Option<&World>| EpisodeStart {
+            seed: seeds[index].unwrap_or_else(|| world.map_or(0, |world| world.episode_start.seed)),
             number: number.unwrap_or_else(|| match (seeds[index], world) {
-                (None, Some(world)) => world.origin.number.wrapping_add(1),
+                (None, Some(world)) => world.episode_start.number.wrapping_add(1),
                 _ => 0,
             }),
             puck,
@@ -118,7 +118,7 @@ impl Worlds {
             catch_panic(|| {
                 let start = |index: usize| {
                     let world = worlds.get(index);
-                    mask[index].then(|| World::start(setup, origin(index, world), world))
+                    mask[index].then(|| World::start(setup, episode_start(index, world), world))
                 };
                 Ok(match pool {
                     None => (0..mask.len()).map(start).collect(),
@@ -150,7 +150,7 @@ impl Worlds {
         slf: &Bound<'_, Self>,
         py: Python<'_>,
         actions: PyReadonlyArray2<'_, f64>,
-        mut rows: Rows<'_>,
+        mut rows: OutputArrays<'_>,
     ) -> PyResult<()> {
         let this = &mut *borrow_mut(slf)?;
         let mut outputs = rows.outputs(this.count, this.setup.observation_len())?;
@@ -199,9 +199,9 @@ impl Worlds {
         let chunk_size = worlds_per_chunk(worlds.len(), pool.current_num_threads());
         pool.spawn(move || {
             let work = || {
-                let mut owned = OwnedRows::new(&setup, worlds.len(), states);
+                let mut owned = OwnedOutputs::new(&setup, worlds.len(), states);
                 let action_len = setup.action_format().len();
-                chunks_with_worlds(&mut worlds, owned.rows(), chunk_size)
+                chunks_with_worlds(&mut worlds, owned.outputs(), chunk_size)
                     .zip(actions.par_chunks(chunk_size * action_len))
                     .for_each(|((worlds, mut outputs), actions)| {
                         step(&setup, autoreset, worlds, actions, &mut outputs);
@@ -220,7 +220,7 @@ impl Worlds {
     }
 
     /// Waits for the step that was sent.
-    fn recv(slf: &Bound<'_, Self>, py: Python<'_>, mut rows: Rows<'_>) -> PyResult<()> {
+    fn recv(slf: &Bound<'_, Self>, py: Python<'_>, mut rows: OutputArrays<'_>) -> PyResult<()> {
         let this = &mut *borrow_mut(slf)?;
         let mut outputs = rows.outputs(this.count, this.setup.observation_len())?;
         let (worlds, owned) = this.state.receive(py)?;
@@ -242,7 +242,7 @@ impl Worlds {
         slf: &Bound<'_, Self>,
         index: usize,
         snapshot: &Bound<'_, Snapshot>,
-        mut rows: Rows<'_>,
+        mut rows: OutputArrays<'_>,
     ) -> PyResult<()> {
         let this = &mut *borrow_mut(slf)?;
         let snapshot = snapshot.get();
@@ -269,8 +269,8 @@ impl Worlds {
     fn origins(slf: &Bound<'_, Self>) -> PyResult<Vec<(u64, u32)>> {
         let this = &mut *borrow_mut(slf)?;
         let worlds = this.state.idle_worlds()?;
-        let origin = |world: &World| (world.origin.seed, world.origin.number);
-        Ok(worlds.iter().map(origin).collect())
+        let episode_start = |world: &World| (world.episode_start.seed, world.episode_start.number);
+        Ok(worlds.iter().map(episode_start).collect())
     }
 
     /// The true state of a world, see [`crate::world::STATE_LEN`].

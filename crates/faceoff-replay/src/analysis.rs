@@ -3,8 +3,8 @@
 
 use crate::{
     clip::Clip,
+    constraint::Constraint,
     error::ReplayError,
-    group::Group,
     header::{Contact, ContactWith, RallyEndEvent, RallyEndKind},
 };
 use std::collections::VecDeque;
@@ -76,7 +76,7 @@ pub struct Shot {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LocatedViolation {
     pub side: usize,
-    pub group: Group,
+    pub constraint: Constraint,
     /// The first sample of the violation.
     pub first_sample: u32,
     pub last_sample: u32,
@@ -247,7 +247,7 @@ impl Analyzer {
             // A violation may continue from the previous clip.
             let previous = self.analysis.violations.iter_mut().rev().find(|violation| {
                 violation.side == side
-                    && violation.group == span.group
+                    && violation.constraint == span.constraint
                     && violation.last_sample == first
             });
             match previous {
@@ -259,7 +259,7 @@ impl Analyzer {
                     let index = span.from.saturating_sub(first) as usize;
                     self.analysis.violations.push(LocatedViolation {
                         side,
-                        group: span.group,
+                        constraint: span.constraint,
                         first_sample: span.from,
                         last_sample: span.to,
                         max_excess: span.worst,
@@ -395,7 +395,7 @@ mod tests {
     fn shots_and_violations_continue_across_clips() {
         let violation_span = |from, to, worst| ViolationSpan {
             side: 1,
-            group: Group::Ee,
+            constraint: Constraint::Ee,
             from,
             to,
             worst,

@@ -103,7 +103,8 @@ const fn is_zero(count: &u32) -> bool {
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ViolationSummary {
     /// The kind of violation.
-    pub group: ViolationName,
+    #[serde(rename = "group")]
+    pub constraint: ViolationName,
     /// The first sample with a violation. Sample k is the state after k control steps.
     pub from: u32,
     /// Number of samples with a violation.
@@ -122,9 +123,9 @@ pub struct ViolationSummary {
 impl ViolationSummary {
     /// The first sample with a violation; where it happened is not known.
     #[must_use]
-    pub const fn begin(group: ViolationName, from: u32, worst: f64) -> Self {
+    pub const fn begin(constraint: ViolationName, from: u32, worst: f64) -> Self {
         Self {
-            group,
+            constraint,
             from,
             samples: 1,
             worst,

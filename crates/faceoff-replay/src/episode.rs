@@ -5,8 +5,8 @@ use crate::{
     agent_view::AgentView,
     clip::Clip,
     clip_index::{EpisodeLine, TimeBins, ViolationSummary},
+    constraint::Constraint,
     error::ReplayError,
-    group::Group,
     gzip::Gzip,
     header::{ClipKind, EpisodeEndSummary, Header},
     motion::Motion,
@@ -78,21 +78,27 @@ impl Recording {
         self.agent_view
             .answer(sample, row.action, &row.timing, world.is_puck_lost());
         self.tracker.update(0, sample, constraints);
-        for group in Group::ALL {
-            let value = group.value(constraints);
+        for constraint in Constraint::ALL {
+            let value = constraint.value(constraints);
             if value > 0.0 {
-                self.add_violation(group, sample, value, state);
+                self.add_violation(constraint, sample, value, state);
             }
         }
         self.times_s.push(row.timing.computation_time_s);
         self.last = state.puck;
     }
 
-    fn add_violation(&mut self, group: Group, sample: u32, value: f64, state: &EpisodeState) {
+    fn add_violation(
+        &mut self,
+        constraint: Constraint,
+        sample: u32,
+        value: f64,
+        state: &EpisodeState,
+    ) {
         if let Some(violation) = self
             .violations
             .iter_mut()
-            .find(|violation| violation.group == group.name())
+            .find(|violation| violation.constraint == constraint.name())
         {
             violation.samples += 1;
             violation.worst = violation.worst.max(value);
@@ -105,19 +111,19 @@ impl Recording {
                 .max_by(|(_, a), (_, b)| a.total_cmp(b))
                 .map(|(joint, _)| joint)
         };
-        let joint = match group {
-            Group::JointPos => most_exceeded(std::array::from_fn(|i| {
+        let joint = match constraint {
+            Constraint::JointPos => most_exceeded(std::array::from_fn(|i| {
                 state.q[i].abs() / LINKS[i].range_rad
             })),
-            Group::JointVel => most_exceeded(std::array::from_fn(|i| {
+            Constraint::JointVel => most_exceeded(std::array::from_fn(|i| {
                 state.dq_filtered[i].abs() / LINKS[i].velocity_limit_rad_s
             })),
-            Group::Ee | Group::Link => None,
+            Constraint::Ee | Constraint::Link => None,
         };
         self.violations.push(ViolationSummary {
             at: Some([x, y]),
             joint,
-            ..ViolationSummary::begin(group.name(), sample, value)
+            ..ViolationSummary::begin(constraint.name(), sample, value)
         });
     }
 

@@ -124,7 +124,7 @@ impl Chunk {
             .iter_mut()
             .flat_map(ViolationTracker::take)
             .collect();
-        violations.sort_by_key(|span| (span.from, span.side, span.group));
+        violations.sort_by_key(|span| (span.from, span.side, span.constraint));
         let motion = Clip {
             header: Header {
                 contacts,

@@ -1,7 +1,7 @@
 //! The header of a clip (the recording of an episode or a part of a game for replays): JSON with everything but the columns'
 //! numbers. A *sample* is the state after a control step.
 
-use crate::group::Group;
+use crate::constraint::Constraint;
 use faceoff_sim::model::CONTROL_STEP_S;
 use faceoff_types::EpisodeEnd;
 use serde::{Deserialize, Serialize};
@@ -129,12 +129,13 @@ pub enum ContactWith {
     OpponentMallet,
 }
 
-/// A violation of a group of constraints over some samples.
+/// A violation of a constraint over some samples.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ViolationSpan {
     /// The side, 0 or 1.
     pub side: u32,
-    pub group: Group,
+    #[serde(rename = "group")]
+    pub constraint: Constraint,
     /// The first sample of the violation.
     pub from: u32,
     /// The last sample of the violation.

@@ -10,11 +10,11 @@ mod analysis;
 mod clip;
 mod clip_index;
 mod column;
+mod constraint;
 mod end_reasons;
 mod episode;
 mod error;
 mod game;
-mod group;
 mod gzip;
 mod header;
 pub mod model;
@@ -31,10 +31,10 @@ pub use analysis::*;
 pub use clip::Clip;
 pub use clip_index::{ClipIndex, EpisodeLine, TimeBins, ViolationSummary};
 pub use column::Column;
+pub use constraint::Constraint;
 pub use end_reasons::*;
 pub use error::ReplayError;
 pub use game::{CHUNK_STEPS, GameClipRecorder};
-pub use group::Group;
 pub use header::{
     ClipKind, ColumnHeader, Contact, ContactWith, EpisodeEndSummary, Header, RallyEndEvent,
     RallyEndKind, TrackingGap, ViolationSpan,

@@ -24,7 +24,7 @@ impl PlainRecording {
             let known = self
                 .violations
                 .iter_mut()
-                .find(|known| known.group == *name);
+                .find(|known| known.constraint == *name);
             if let Some(violation) = known {
                 violation.samples += 1;
                 violation.worst = violation.worst.max(*value);

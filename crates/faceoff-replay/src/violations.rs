@@ -1,12 +1,12 @@
 //! Joins violations of constraints in successive samples (states after control steps) to spans.
 
-use crate::{group::Group, header::ViolationSpan};
+use crate::{constraint::Constraint, header::ViolationSpan};
 use faceoff_sim::ConstraintValues;
 
 /// Collects the violations of a side.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ViolationTracker {
-    /// Spans that the last sample belongs to, for each [`Group`].
+    /// Spans that the last sample belongs to, for each [`Constraint`].
     current: [Option<ViolationSpan>; 4],
     finished: Vec<ViolationSpan>,
 }
@@ -14,12 +14,12 @@ pub(crate) struct ViolationTracker {
 impl ViolationTracker {
     /// Adds the values of a sample.
     pub fn update(&mut self, side: u32, sample: u32, values: &ConstraintValues) {
-        for (group, current) in Group::ALL.into_iter().zip(&mut self.current) {
-            let value = group.value(values);
+        for (constraint, current) in Constraint::ALL.into_iter().zip(&mut self.current) {
+            let value = constraint.value(values);
             if value > 0.0 {
                 let span = current.get_or_insert(ViolationSpan {
                     side,
-                    group,
+                    constraint,
                     from: sample,
                     to: sample,
                     worst: value,
@@ -36,7 +36,7 @@ impl ViolationTracker {
     pub fn take(&mut self) -> Vec<ViolationSpan> {
         let mut all = std::mem::take(&mut self.finished);
         all.extend(self.current.iter_mut().filter_map(Option::take));
-        all.sort_by_key(|span| (span.from, span.group));
+        all.sort_by_key(|span| (span.from, span.constraint));
         all
     }
 }

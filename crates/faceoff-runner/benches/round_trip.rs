@@ -121,19 +121,19 @@ fn bench_round_trips(criterion: &mut Criterion) {
                 step += 1;
             });
         });
-        // The time charged to a team: the clock stops with the last byte of the answer.
-        let mut charged: Vec<f64> = (0..5000)
+        // The computation time of the agent, by which its answers are judged: the clock stops with the last byte of the answer.
+        let mut times_s: Vec<f64> = (0..5000)
             .map(|_| {
                 step += 1;
                 session.step(step, &observation).unwrap().computation_time_s
             })
             .collect();
-        charged.sort_by(f64::total_cmp);
+        times_s.sort_by(f64::total_cmp);
         println!(
-            "{name}: charged computation time p50 {:.1} us, p99 {:.1} us, max {:.1} us",
-            1e6 * charged[charged.len() / 2],
-            1e6 * charged[charged.len() * 99 / 100],
-            1e6 * charged[charged.len() - 1]
+            "{name}: computation time p50 {:.1} us, p99 {:.1} us, max {:.1} us",
+            1e6 * times_s[times_s.len() / 2],
+            1e6 * times_s[times_s.len() * 99 / 100],
+            1e6 * times_s[times_s.len() - 1]
         );
         session.finish().unwrap();
     }

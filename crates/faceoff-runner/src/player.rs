@@ -11,7 +11,7 @@ use crate::{
     session::Session,
     wait_breakdown::WaitBreakdown,
 };
-use faceoff_episode::{Environment, Question, RunningEpisode, StepSink};
+use faceoff_episode::{Question, RunningEpisode, StepSink, WorldFactory};
 use faceoff_types::{AgentFaultKind, EpisodeOutcome, Phase, Task};
 use std::time::Instant;
 
@@ -21,7 +21,7 @@ pub(crate) struct Player<'a> {
     bundle: &'a Bundle,
     env: &'a AgentEnvironment,
     task: Task,
-    environment: &'a dyn Environment,
+    world_factory: &'a dyn WorldFactory,
     /// `None` before the first episode and after a fault.
     session: Option<Session<'a>>,
     log: Log,
@@ -107,7 +107,7 @@ impl<'a> Player<'a> {
         env: &'a AgentEnvironment,
         task: Task,
         episodes: u32,
-        environment: &'a dyn Environment,
+        world_factory: &'a dyn WorldFactory,
         monitor: &'a dyn InterferenceMonitor,
         on_host_interference: OnHostInterference,
     ) -> Self {
@@ -115,7 +115,7 @@ impl<'a> Player<'a> {
             bundle,
             env,
             task,
-            environment,
+            world_factory,
             session: None,
             log: Log::new(env.limits.stderr_tail_bytes),
             reset_budget: ResetBudget::new(&env.time, episodes),
@@ -206,7 +206,7 @@ impl<'a> Player<'a> {
         };
         let layout = session.as_ref().ok().map(Session::layout);
         let mut running =
-            RunningEpisode::begin(self.environment, self.task, episode, layout, sink)?
+            RunningEpisode::begin(self.world_factory, self.task, episode, layout, sink)?
                 .with_max_steps(max_steps);
         let mut session = match session {
             Ok(session) => session,
@@ -309,7 +309,7 @@ impl<'a> Player<'a> {
             Ok(timing) => timing.computation_time_s,
             Err(
                 SessionError::TimedOut { wait, .. } | SessionError::HostInterference { wait, .. },
-            ) => wait.charged().as_secs_f64(),
+            ) => wait.agent_time().as_secs_f64(),
             Err(SessionError::Agent { .. } | SessionError::Platform(_)) => {
                 asked_at.elapsed().as_secs_f64()
             }

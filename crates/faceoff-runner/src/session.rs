@@ -223,7 +223,7 @@ impl<'w> Session<'w> {
         .map_err(|fault| answer.to_error(fault))?;
         let wait = &answer.wait;
         Ok(AnswerTiming {
-            computation_time_s: wait.charged().as_secs_f64(),
+            computation_time_s: wait.agent_time().as_secs_f64(),
             host_time_s: wait.host_interference.as_secs_f64(),
             cpu_time_s: wait.cpu_time_s,
         })
@@ -283,7 +283,7 @@ fn hello(
                 got: format!("ready with interpolation {}", ready.layout),
             }))
         }
-        _ => Ok((ready.layout, answer.wait.charged().as_secs_f64())),
+        _ => Ok((ready.layout, answer.wait.agent_time().as_secs_f64())),
     }
 }
 

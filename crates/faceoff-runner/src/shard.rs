@@ -78,18 +78,18 @@ pub fn play_shard(
     monitor: &dyn InterferenceMonitor,
 ) -> Result<ShardReport, PlatformFault> {
     let _pinned = AffinityGuard::avoid(&env.agent_cpus);
-    let environment = env.simulator.environment(&shard_conditions(spec))?;
+    let world_factory = env.simulator.world_factory(&shard_conditions(spec))?;
     let mut calibration = Calibration::start(&env.agent_cpus)?;
     let mut player = Player::new(
         bundle,
         env,
         spec.task,
         spec.episodes.end.saturating_sub(spec.episodes.start),
-        environment.as_ref(),
+        world_factory.as_ref(),
         monitor,
         OnHostInterference::KeepLastTry,
     );
-    let max_steps = environment.max_steps(spec.task);
+    let max_steps = world_factory.max_steps(spec.task);
     let played = play(
         spec,
         max_steps,

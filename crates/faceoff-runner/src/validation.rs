@@ -119,7 +119,7 @@ pub fn validate_monitored(
     monitor: &dyn InterferenceMonitor,
 ) -> Result<ValidationReport, PlatformFault> {
     let _pinned = AffinityGuard::avoid(&env.agent_cpus);
-    let environment = env.simulator.environment(&Conditions {
+    let world_factory = env.simulator.world_factory(&Conditions {
         ruleset: spec.ruleset,
         profile: spec.profile,
         perturbations: &spec.perturbations,
@@ -145,14 +145,14 @@ pub fn validate_monitored(
                 env,
                 task,
                 episodes.end - episodes.start,
-                environment.as_ref(),
+                world_factory.as_ref(),
                 monitor,
                 OnHostInterference::PlatformFault,
             );
             for episode in episodes {
                 outcomes.push(player.play(
                     episode,
-                    environment.max_steps(task),
+                    world_factory.max_steps(task),
                     &mut answers,
                     cancelled,
                 )?);

@@ -16,8 +16,8 @@ pub struct WaitBreakdown {
 }
 
 impl WaitBreakdown {
-    /// The time charged to the agent.
-    pub(crate) fn charged(&self) -> Duration {
+    /// The time that the agent used, by which its answer is judged.
+    pub(crate) fn agent_time(&self) -> Duration {
         self.wall.saturating_sub(self.host_interference) + self.early_cpu_time
     }
 }

@@ -6,7 +6,7 @@ use faceoff_types::{
     Violations,
 };
 
-/// Lowest penalty for computation time in one episode that is not 0 (paper §2.2).
+/// Lowest penalty for computation time in one episode that is not 0 (paper on the 2023 Robot Air Hockey Challenge, §2.2).
 pub const COMPUTATION_TIME_MIN_POINTS: f64 = 0.5;
 /// Highest penalty for computation time in one episode (paper §2.2), and the penalty for an agent fault.
 pub const COMPUTATION_TIME_MAX_POINTS: f64 = 2.0;

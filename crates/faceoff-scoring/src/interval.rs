@@ -18,7 +18,8 @@ pub fn wilson95(successes: u32, episodes: u32) -> [f64; 2] {
     )
 }
 
-/// [`wilson95`] of a published rate (a fraction) over a number of episodes.
+/// [`wilson95`] of a success rate over a number of episodes, for results of which only the rate (a fraction) is published, without
+/// the number of successes.
 #[must_use]
 pub fn wilson95_of_rate(rate: f64, episodes: u32) -> [f64; 2] {
     if episodes == 0 {

@@ -10,7 +10,7 @@ use serde::{
     de::{Deserializer, IgnoredAny},
 };
 
-/// Episodes of each task in the qualifying stage (paper §2.2).
+/// Episodes of each task in the qualifying stage (paper on the 2023 Robot Air Hockey Challenge, §2.2).
 pub const QUALIFYING_EPISODES: u32 = 1000;
 
 /// A team's published results in one task: the numbers that a board needs.

@@ -3,8 +3,8 @@
 
 use faceoff_types::{Millionths, Tier, TierBounds};
 
-/// Highest mean penalty per episode of a deployable agent, in points (paper §2.2: 500 per 1000 episodes of the
-/// qualifying stage, 45 per 90 windows of a game).
+/// Highest mean penalty per episode of a deployable agent, in points (paper on the 2023 Robot Air Hockey Challenge, §2.2: 500 per 1000
+/// episodes of the qualifying stage, 45 per 90 windows of a game).
 pub const DEPLOYABLE_POINTS_PER_EPISODE: f64 = 0.5;
 /// Highest mean penalty per episode of an improvable agent, in points (paper §2.2: 1500 per 1000 and 135 per 90).
 pub const IMPROVABLE_POINTS_PER_EPISODE: f64 = 1.5;

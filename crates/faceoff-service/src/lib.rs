@@ -44,5 +44,5 @@ mod upload_slots;
 pub mod viewer;
 pub mod views;
 
-/// Boxes the future of an `async fn` that other crates await. Without it each of these crates would compile the body.
+/// `#[boxed]` on an `async fn` that other crates await makes it return a boxed future. Without it each of these crates would compile the body.
 pub(crate) use async_recursion::async_recursion as boxed;

@@ -1,5 +1,7 @@
-//! Draws the differences between the simulator and recordings of the *reference* (the challenge's own simulator): the figures of
-//! `docs/simulator.md`. A *replay* is a simulated episode with the recorded actions.
+//! Draws the differences between the simulator and recordings of the *reference* (the simulator of the 2023 Robot Air Hockey Challenge):
+//! the figures of
+//! `docs/simulator.md`. A *replay* is a simulated episode with the recorded actions. A *contact* of the puck is
+//! a *bounce* off a rim or an *impact* of a mallet.
 //!
 //! `cargo run -p faceoff-sim --example fidelity -- docs/images/fidelity`
 
@@ -185,7 +187,7 @@ fn draw_contacts(file: &Path) -> DrawResult {
     })
 }
 
-/// Draws the differences of puck and joints in the replays, around the puck's first impact and the first contact with the mallet.
+/// Draws the differences of puck and joints in the replays, around the puck's first contact and its first impact with a mallet.
 fn draw_episodes(file: &Path, replays: &[Replay]) -> DrawResult {
     // From 10 control steps before `zero_step` to 60 after it.
     let line = |replay: &Replay, zero_step: usize, value: &dyn Fn(usize) -> f64| -> Line {
@@ -197,26 +199,26 @@ fn draw_episodes(file: &Path, replays: &[Replay]) -> DrawResult {
     let pucks: Vec<Line> = replays
         .iter()
         .map(|replay| {
-            line(replay, replay.first_impact_step, &|step| {
+            line(replay, replay.first_contact_step, &|step| {
                 replay.steps[step].puck_m
             })
         })
         .collect();
     let joints: Vec<Line> = replays
         .iter()
-        .filter(|replay| replay.first_contact_step != usize::MAX)
+        .filter(|replay| replay.first_mallet_impact_step != usize::MAX)
         .map(|replay| {
-            line(replay, replay.first_contact_step, &|step| {
+            line(replay, replay.first_mallet_impact_step, &|step| {
                 replay.steps[step].joints_rad
             })
         })
         .collect();
     let mut distances: Vec<f64> = replays
         .iter()
-        .map(|replay| replay.largest(|step| step <= replay.first_impact_step + 8, |d| d.puck_m))
+        .map(|replay| replay.largest(|step| step <= replay.first_contact_step + 8, |d| d.puck_m))
         .collect();
     println!(
-        "episodes: puck until 8 steps after its first impact: median {:.1e} m, 90th percentile {:.1e} m, \
+        "episodes: puck until 8 steps after its first contact: median {:.1e} m, 90th percentile {:.1e} m, \
          {} of {} within 5 mm",
         quantile(&mut distances, 0.5),
         quantile(&mut distances, 0.9),
@@ -228,7 +230,7 @@ fn draw_episodes(file: &Path, replays: &[Replay]) -> DrawResult {
         logarithmic(
             &left,
             "puck: distance from the recorded one",
-            ["control steps after its first impact", "m"],
+            ["control steps after its first contact", "m"],
             1e-9..1.0,
             &pucks,
             Some((0.005, "5 mm")),
@@ -236,7 +238,7 @@ fn draw_episodes(file: &Path, replays: &[Replay]) -> DrawResult {
         logarithmic(
             &right,
             "joints: largest difference",
-            ["control steps after the first contact", "rad"],
+            ["control steps after the first mallet impact", "rad"],
             1e-10..1e-1,
             &joints,
             Some((5e-4, "bound")),

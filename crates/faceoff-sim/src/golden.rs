@@ -7,8 +7,9 @@
 use crate::AirHockeyTask;
 use crate::{
     AirHockeyProfile,
+    // What a robot gets from its agent for a control step, over the channel that adds delays and noise.
     channel::Command,
-    episode::{Episode, constraints::ViolatedGroups},
+    episode::{Episode, constraints::ViolatedConstraints},
     game::{Game, GameSetup},
     model::{EE_DESIRED_HEIGHT_M, JOINTS},
     robot::{inverse_kinematics::inverse_kinematics, plant::Plant},
@@ -122,7 +123,8 @@ pub fn episode_hash(mut episode: Episode) -> String {
     }
 }
 
-/// A side's window, under the name that the hashes are made of.
+/// The violated constraints of a side in a window (500 control steps of a game). It has the name that
+/// [`ViolatedConstraints`] had when the first hashes were made, because its `Debug` text is hashed.
 #[derive(Debug)]
 #[expect(dead_code, reason = "its fields are read by `Debug`")]
 struct Violations {
@@ -132,14 +134,14 @@ struct Violations {
     joint_vel: bool,
 }
 
-impl From<ViolatedGroups> for Violations {
-    fn from(groups: ViolatedGroups) -> Self {
-        let ViolatedGroups {
+impl From<ViolatedConstraints> for Violations {
+    fn from(violated: ViolatedConstraints) -> Self {
+        let ViolatedConstraints {
             ee,
             link,
             joint_pos,
             joint_vel,
-        } = groups;
+        } = violated;
         Self {
             ee,
             link,

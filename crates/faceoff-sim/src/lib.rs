@@ -19,7 +19,7 @@
 )]
 
 pub mod batch;
-// Observations and commands between agent and robot, with the perturbations (noise, delays, a lost puck).
+// The link between an agent and its robot: observations and commands, with the perturbations (noise, delays, a lost puck).
 pub mod channel;
 pub mod dynamics;
 pub mod episode;
@@ -44,7 +44,7 @@ pub use channel::Command;
 pub use dynamics::simd_level::SimdLevel;
 pub use episode::{
     AirHockeyTask, EPISODE_STEPS, Episode, EpisodeState, StepOutcome,
-    constraints::{ConstraintValues, ViolatedGroups},
+    constraints::{ConstraintValues, ViolatedConstraints},
     env_info::{EnvInfo, env_info, env_info_for},
 };
 pub use episode_step::{step_episodes, step_episodes_on};

@@ -1,5 +1,5 @@
 //! The numbers of the robot: a KUKA LBR iiwa 14 arm with a rod, at whose end a mallet hangs on a *universal joint* (two hinges). They
-//! are read from the *reference*, the challenge's own simulator; `docs/robot.md` lists them.
+//! are read from the *reference*, the simulator of the 2023 Robot Air Hockey Challenge; `docs/robot.md` lists them.
 
 pub use crate::{JOINTS, SUBSTEPS};
 pub use faceoff_types::CONTROL_STEP_S;

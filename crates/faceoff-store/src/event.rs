@@ -256,7 +256,8 @@ pub enum Event {
         reason: String,
     },
     /// An ablation of a submission was requested: its evaluation under each perturbation profile.
-    AblationOrdered {
+    #[serde(rename = "ablation_ordered")]
+    AblationRequested {
         submission: SubmissionId,
         /// Episodes of each task in each profile.
         episodes_per_task: u32,

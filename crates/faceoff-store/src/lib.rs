@@ -40,7 +40,7 @@ mod tables;
 mod write;
 mod write_ahead_log;
 
-/// Boxes the futures of public functions. Each crate that awaits an `async fn` compiles its body; boxed, only the store
+/// `#[boxed]` on a public `async fn` makes it return a boxed future. Each crate that awaits an `async fn` compiles its body; boxed, only the store
 /// does. This saves the server, the workers and every test from compiling it. A call costs one allocation.
 pub(crate) use async_recursion::async_recursion as boxed;
 

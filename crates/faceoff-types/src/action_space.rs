@@ -14,7 +14,8 @@ pub struct ActionSpace {
     pub layouts: Vec<ActionLayout>,
 }
 
-/// A layout of actions: its code, and the lengths of the nested arrays.
+/// A layout of actions: its code, and the lengths of the nested arrays. In air hockey it follows from the *interpolation* that an agent
+/// chooses: how the numbers of an action become a trajectory.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct ActionLayout {
     /// The code by which agents choose it: a number, or `null`.

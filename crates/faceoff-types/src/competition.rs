@@ -32,7 +32,7 @@ pub struct Competition {
     pub tasks: Vec<TaskInfo>,
     /// How episodes end, in the order of lists.
     pub ends: Vec<EndInfo>,
-    /// Kinds of violations of the agent's limits, in the order of tables.
+    /// Kinds of violations of the agent's limits, in display order.
     pub violations: Vec<ViolationInfo>,
     /// The layouts of agents' actions.
     pub actions: ActionSpace,

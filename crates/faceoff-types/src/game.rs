@@ -6,10 +6,10 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// Control steps of a window, the equivalent of an episode in games: each violation counts at most once per window
-/// (paper §2.2).
+/// (paper on the 2023 Robot Air Hockey Challenge, §2.2).
 pub const WINDOW_STEPS: u32 = 500;
 
-/// Windows of a game: 45,000 control steps, 15 minutes (paper §2.2).
+/// Windows (of 500 control steps) of a game: 45,000 control steps, 15 minutes (paper §2.2).
 pub const GAME_WINDOWS: u32 = 90;
 
 /// Number of fouls of a robot that give its opponent one point (reference implementation).

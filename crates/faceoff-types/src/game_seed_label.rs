@@ -17,7 +17,7 @@ pub enum GameSeedLabel {
         /// Number of the meeting in the round, from 1, in the order of the draw.
         meeting: u32,
     },
-    /// The same meeting in a replay.
+    /// The same meeting in a *replay*: a repetition of the tournament's schedule with other seeds.
     ScheduleReplay {
         /// The number of the tournament in its season, from 1.
         tournament: u32,

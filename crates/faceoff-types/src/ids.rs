@@ -95,7 +95,7 @@ id!(
     "person"
 );
 id!(
-    /// A named API token of a user, a team or the host.
+    /// A named API token of a user, a team or the host (the server's operator).
     TokenId,
     "token"
 );

@@ -1,5 +1,5 @@
-//! Labels of seeds: what the episodes of an evaluation or ablation are derived from. Labels are stored and published
-//! instead of the secret seed.
+//! Labels of seeds. The seed of a run (the episodes of an evaluation or ablation) derives from its label, such as its day, and the
+//! secret of the season. Labels are stored and published instead of the secret seeds.
 
 use crate::{EvaluationId, ProposalId, StageDay, seed::Seed};
 use jiff::civil::Date;

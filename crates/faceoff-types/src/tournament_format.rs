@@ -42,7 +42,7 @@ impl TournamentFormat {
     }
 }
 
-/// The format of the challenge: all teams play each other twice.
+/// The format of the 2023 Robot Air Hockey Challenge: all teams play each other twice.
 impl Default for TournamentFormat {
     fn default() -> Self {
         Self::RoundRobin {

@@ -219,7 +219,7 @@ impl TournamentSettings {
 mod tests {
     use super::*;
 
-    /// The rules of the challenge with these changes.
+    /// The rules of the 2023 Robot Air Hockey Challenge with these changes.
     fn rules(json: &str) -> Result<TournamentRules, serde_json::Error> {
         let mut fields: serde_json::Map<String, serde_json::Value> = serde_json::from_str(json)?;
         fields.insert("ruleset".to_owned(), "airhockey-2023.3".into());

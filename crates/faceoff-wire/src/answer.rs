@@ -11,6 +11,7 @@ use fields::Fields;
 
 mod action;
 mod diagnosis;
+// Markers in the texts of serde errors, by which their kind is found.
 mod error_markers;
 mod fields;
 mod repeated_keys;

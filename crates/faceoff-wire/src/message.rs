@@ -1,5 +1,5 @@
-//! Messages from the evaluator to an agent, one JSON object per line. An agent plays *episodes* of a qualifying task, or a game, which is a
-//! sequence of *rallies*.
+//! Messages from the evaluator to an agent, one JSON object per line. An agent plays *episodes* of a task (in air hockey
+//! hit, defend or prepare), or a game, which is a sequence of *rallies*.
 
 use crate::protocol::PROTOCOL_VERSION;
 use faceoff_types::{AgentTask, Task};
@@ -45,7 +45,7 @@ pub enum Message<'a> {
 }
 
 impl<'a> Message<'a> {
-    /// `hello` for the agent of a qualifying task, or for one of the two agents of a game.
+    /// `hello` for the agent of a task that is played in episodes, or for one of the two agents of a game.
     #[must_use]
     pub fn hello(agent_task: AgentTask, env: &'a RawValue) -> Self {
         Self::Hello {

@@ -34,7 +34,8 @@ mod slot_threads;
 #[cfg(test)]
 mod tests;
 
-/// Boxes public async functions, so that they are compiled once, here, and not in each crate that awaits them.
+/// `#[boxed]` on a public `async fn` makes it return a boxed future, so that its body is compiled once, here, and not in each crate
+/// that awaits it.
 pub(crate) use async_recursion::async_recursion as boxed;
 
 pub use cleanup::clean_up;

@@ -35,7 +35,9 @@ fn striker_beats_baseline_from_either_side() {
 
 #[test]
 fn baseline_beats_hold_and_stays_deployable() {
-    let tally = play_game(2023, [Player::agent(Baseline::new, 0), Player::Hold(None)]);
+    let robot_index = 0;
+    let baseline = Player::agent(Baseline::new, robot_index);
+    let tally = play_game(2023, [baseline, Player::hold()]);
     assert!(tally.score[0] > tally.score[1], "{tally:?}");
     assert!(tally.goals[0] >= 1, "{tally:?}");
     assert!(

@@ -20,7 +20,8 @@ fn count_successes(task: AirHockeyTask, agent_task: striker::Task) -> u32 {
     let settings = PerturbationSettings::default();
     let factors = AirHockeyProfile::Evaluation.factors();
     let plant = Plant::for_factors(factors, &settings, season.model_mismatch());
-    let mut agent = Baseline::new(agent_task, &env(2, 0));
+    let (robots, robot_index) = (2, 0);
+    let mut agent = Baseline::new(agent_task, &env(robots, robot_index));
     let mut successes = 0;
     for index in 0..EPISODES {
         let seed = season.episode(task, index);

@@ -48,7 +48,8 @@ fn agent(task: AirHockeyTask) -> Agent {
         AirHockeyTask::Defend => striker::Task::Defend,
         AirHockeyTask::Prepare => striker::Task::Prepare,
     };
-    Agent::new(task, &env(1, 0))
+    let (robots, robot_index) = (1, 0);
+    Agent::new(task, &env(robots, robot_index))
 }
 
 /// Penalty points up to which the rules call an agent *deployable*: half a point per episode.

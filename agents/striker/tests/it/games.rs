@@ -22,7 +22,7 @@ fn play_game(profile: AirHockeyProfile, seed: u64, mut players: [Player; 2]) -> 
 #[test]
 fn striker_beats_hold_from_either_side() {
     for robot_index in [0, 1] {
-        let mut players = [Player::Hold(None), Player::Hold(None)];
+        let mut players = [Player::hold(), Player::hold()];
         players[robot_index] = Player::agent(Agent::new, robot_index);
         let tally = play_game(AirHockeyProfile::Evaluation, 2, players);
         assert!(tally.goals[robot_index] >= 2, "{tally:?}");

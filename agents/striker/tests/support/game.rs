@@ -1,7 +1,7 @@
 //! Plays games of two robots in this process, without pipes, clocks and sandbox.
 
 use faceoff_sim::{AirHockeyProfile, Command, Game, GameSetup, GameStep, Interpolation, RallyEnd};
-use faceoff_sim::{PerturbationSettings, Plant, ViolatedGroups};
+use faceoff_sim::{PerturbationSettings, Plant, ViolatedConstraints};
 use faceoff_types::Seed;
 use striker::{Env, Policy, Task};
 
@@ -16,6 +16,11 @@ pub enum Player {
 }
 
 impl Player {
+    /// A player that keeps the first pose of each rally.
+    pub const fn hold() -> Self {
+        Self::Hold(None)
+    }
+
     /// An agent for the robot with index 0 or 1 (robot 1 or 2).
     pub fn agent<P: Policy + 'static>(
         make_policy: impl Fn(Task, &Env) -> P,
@@ -67,7 +72,7 @@ pub struct Tally {
 }
 
 impl Tally {
-    fn count_window(&mut self, violations: &[ViolatedGroups; 2]) {
+    fn count_window(&mut self, violations: &[ViolatedConstraints; 2]) {
         for (robot, v) in violations.iter().enumerate() {
             let violated = [v.ee, v.link, v.joint_pos, v.joint_vel];
             for (k, (is_violated, points)) in violated.into_iter().zip(POINTS).enumerate() {

@@ -217,6 +217,7 @@ fn fault_holds_the_arm_and_restarts_the_agent() {
     // Both arms hold, so the first rally ends with a foul, since the puck stays in one half for too long: after 752 steps.
     assert_eq!(log.effects[1][..3], [Effect::InTime; 3]);
     assert_eq!(log.effects[1][3], Effect::Fault);
+    // After the fault no answers are expected until the end of the rally.
     assert_eq!(log.effects[1][4..752], [Effect::Held; 748]);
     assert_eq!(log.effects[1][752..], [Effect::InTime; 48]);
     assert_eq!(log.effects[0], [Effect::InTime; 800]);

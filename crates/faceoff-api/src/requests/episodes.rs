@@ -93,7 +93,7 @@ impl EpisodeFilter {
             ViolatedLimit::One(name) => episode
                 .violations
                 .iter()
-                .any(|violation| violation.group == name),
+                .any(|violation| violation.constraint == name),
             ViolatedLimit::Late => episode.late_answers > 0,
         };
         self.task.is_none_or(|task| task == episode.task)

@@ -53,7 +53,8 @@ pub enum InvitedRole {
     /// The first member of a new team.
     Founder,
     /// No new account: `person`, who has lost password and tokens, gets access again.
-    Return,
+    #[serde(rename = "return")]
+    PasswordReset,
 }
 
 /// An invitation to create.

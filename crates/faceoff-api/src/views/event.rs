@@ -13,8 +13,8 @@ pub struct EventView {
     pub id: i64,
     /// When it happened.
     pub at: Timestamp,
-    /// Who or what made the change: `organiser` (the host), `person:ID`, `team:ID`, `visitor`, `schedule`, `worker:NAME`
-    /// or `server`.
+    /// Who or what made the change: `organiser` (the host: the server's operator, who holds the file `admin-token`),
+    /// `person:ID`, `team:ID`, `visitor`, `schedule`, `worker:NAME` or `server`.
     #[schema(example = "organiser")]
     pub actor: String,
     /// Name of the user or the team; absent for other actors.

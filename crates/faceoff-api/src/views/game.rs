@@ -78,7 +78,7 @@ pub enum PurposeView {
         /// The team that requested it.
         requested_by: TeamName,
     },
-    /// A game of the schedule, replayed with another seed.
+    /// A game of a repetition of the schedule: all games of the tournament played again with other seeds.
     #[serde(rename = "replay")]
     ScheduleReplay {
         /// Number of the replay, from 1.

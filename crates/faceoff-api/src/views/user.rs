@@ -29,8 +29,8 @@ pub struct UserView {
 /// The caller: the user or API client that sent the request.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct CallerView {
-    /// `organiser`, `member`, `team` (an API client with a team's token) or `host` (the token in the data folder, with
-    /// an organiser's rights).
+    /// `organiser`, `member`, `team` (an API client with a team's token) or `host` (the server's operator, with the
+    /// token in the file `admin-token` and an organiser's rights).
     #[schema(example = "member")]
     pub role: String,
     /// The user; null for a team's API client and the host.

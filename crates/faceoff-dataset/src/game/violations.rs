@@ -3,7 +3,7 @@
 use super::table::GameTable;
 use crate::error::DatasetError;
 use arrow_array::{cast::AsArray as _, types::Float64Type};
-use faceoff_replay::Group;
+use faceoff_replay::Constraint;
 use faceoff_types::ViolationName;
 
 /// A violation of a constraint in successive samples. Sample k is the state after k control steps of the game.
@@ -20,22 +20,22 @@ impl Violation {
     /// The violations in a side's table, in the order of their first sample.
     pub(super) fn read(mut steps: GameTable) -> Result<Vec<Self>, DatasetError> {
         let mut violations = Vec::new();
-        let mut current: [Option<Self>; Group::ALL.len()] = [None; Group::ALL.len()];
+        let mut current: [Option<Self>; Constraint::ALL.len()] = [None; Constraint::ALL.len()];
         let mut sample = 0;
         while let rows @ 1.. = steps.fill()? {
             let Some(batch) = steps.take(rows) else { break };
-            let columns = Group::ALL.map(|group| {
-                batch[&*format!("constraint_{}", group.name())].as_primitive::<Float64Type>()
+            let columns = Constraint::ALL.map(|constraint| {
+                batch[&*format!("constraint_{}", constraint.name())].as_primitive::<Float64Type>()
             });
             for row in 0..batch.num_rows() {
                 sample += 1;
-                for ((group, column), current) in
-                    Group::ALL.into_iter().zip(columns).zip(&mut current)
+                for ((constraint, column), current) in
+                    Constraint::ALL.into_iter().zip(columns).zip(&mut current)
                 {
                     let value = column.value(row);
                     if value > 0.0 {
                         let violation = current.get_or_insert(Self {
-                            name: group.name(),
+                            name: constraint.name(),
                             samples: [sample; 2],
                             worst: value,
                         });

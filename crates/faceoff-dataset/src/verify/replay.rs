@@ -14,7 +14,7 @@ use arrow_array::{
     types::{Float64Type, Int64Type},
 };
 use faceoff_episode::{
-    AnswerTiming, Environment, EpisodeStart, RecordError, RunningEpisode, StepRow, StepSink,
+    AnswerTiming, EpisodeStart, RecordError, RunningEpisode, StepRow, StepSink, WorldFactory,
 };
 use faceoff_types::{
     ActionLayout, ActionSpace, AgentFault, Competition, EpisodeOutcome, RulesetInfo,
@@ -24,7 +24,7 @@ use std::sync::Arc;
 /// Simulates the episodes of an evaluation again.
 pub(super) struct Replayer {
     ruleset: RulesetInfo,
-    environment: Box<dyn Environment>,
+    world_factory: Box<dyn WorldFactory>,
     competition: Arc<Competition>,
 }
 
@@ -91,12 +91,12 @@ struct RecordedInputs {
 impl Replayer {
     pub fn new(
         ruleset: RulesetInfo,
-        environment: Box<dyn Environment>,
+        world_factory: Box<dyn WorldFactory>,
         competition: &Arc<Competition>,
     ) -> Self {
         Self {
             ruleset,
-            environment,
+            world_factory,
             competition: competition.clone(),
         }
     }
@@ -110,8 +110,8 @@ impl Replayer {
             measured: Measurements::default(),
         };
         let (task, episode) = (recorded.task, recorded.episode);
-        let environment = self.environment.as_ref();
-        let running = RunningEpisode::begin(environment, task, episode, inputs.layout, rows);
+        let world_factory = self.world_factory.as_ref();
+        let running = RunningEpisode::begin(world_factory, task, episode, inputs.layout, rows);
         let running = running.map_err(|unknown| {
             row_difference(
                 recorded,

@@ -42,11 +42,11 @@ pub fn verify_shard(
         return Err(unusable("the recording and the report have different outcomes").into());
     }
     let competition = simulator.competition();
-    let environment = simulator.environment(&shard_conditions(spec));
-    let environment = environment.map_err(|invalid| VerifyError::Job(invalid.to_string()))?;
+    let world_factory = simulator.world_factory(&shard_conditions(spec));
+    let world_factory = world_factory.map_err(|invalid| VerifyError::Job(invalid.to_string()))?;
     let ruleset = competition.find_ruleset(spec.ruleset.as_str());
     let ruleset = *ruleset.map_err(|unknown| VerifyError::Job(unknown.to_string()))?;
-    let replayer = Replayer::new(ruleset, environment, competition);
+    let replayer = Replayer::new(ruleset, world_factory, competition);
     let (episodes, steps) = (recording.episodes.path(), recording.steps.path());
     let mut reader = EpisodeReader::open_shard(spec, outcomes.len(), episodes, steps, competition)?;
     for outcome in outcomes {

@@ -182,7 +182,7 @@ fn clip_index_matches_the_dataset_for_each_episode() {
             let found = summary
                 .violations
                 .iter()
-                .find(|violation| violation.group == name);
+                .find(|violation| violation.constraint == name);
             match (recorded, found) {
                 (None, None) => {}
                 (Some(recorded), Some(found)) => {

@@ -66,14 +66,14 @@ pub fn spec(task: Task, episodes: Range<u32>) -> ShardSpec {
 pub fn play(spec: &ShardSpec, agent: Option<Agent>, out: &Path) -> ShardReport {
     let folder = ShardFolder::create(out).unwrap();
     let mut recorder = Recorder::create(&folder, spec.task, simulator().competition()).unwrap();
-    let environment = simulator().environment(&shard_conditions(spec)).unwrap();
+    let world_factory = simulator().world_factory(&shard_conditions(spec)).unwrap();
     let mut outcomes = Vec::new();
     for episode in spec.episodes.clone() {
         let layout = agent.map(|_| Interpolation::Cubic.into());
-        let mut world = environment.reset(spec.task, episode, layout).unwrap();
+        let mut world = world_factory.reset(spec.task, episode, layout).unwrap();
         recorder.begin(EpisodeStart {
             episode,
-            seed: environment.seed(spec.task, episode),
+            seed: world_factory.seed(spec.task, episode),
             layout,
             world: world.as_ref(),
         });

@@ -105,7 +105,7 @@ fn shards_of_other_magnitudes_are_not_joined() {
 }
 
 #[test]
-fn unreachable_robot_is_detected_in_advance() {
+fn magnitudes_that_no_robot_satisfies_are_refused() {
     let seed = faceoff_types::Seed::from_number(7).model_mismatch();
     let check = |magnitudes: &Magnitudes| simulator().check_season_magnitudes(magnitudes, seed);
     let mut magnitudes = Magnitudes::default();

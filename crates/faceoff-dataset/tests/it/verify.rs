@@ -50,6 +50,7 @@ pub fn check(path: &Path, workers: usize) -> Result<VerifiedDataset, VerifyError
     )
 }
 
+/// The difference that a verification with this number of worker threads finds.
 #[track_caller]
 fn difference(path: &Path, workers: usize) -> Difference {
     match check(path, workers) {

@@ -1,8 +1,8 @@
 //! Episodes in a world other than air hockey: a mass on a line, which the agent pushes to the origin.
 
 use faceoff_episode::{
-    AnswerTiming, Environment, EpisodeStart, NullSink, RecordError, RunningEpisode, StateColumns,
-    StepRow, StepSink, World,
+    AnswerTiming, EpisodeStart, NullSink, RecordError, RunningEpisode, StateColumns, StepRow,
+    StepSink, World, WorldFactory,
 };
 use faceoff_types::{
     ActionLayout, AgentFaultKind, EpisodeEnd, EpisodeOutcome, Phase, Seed, Task, UnknownTask,
@@ -77,7 +77,7 @@ struct Line {
     start_m: Option<f64>,
 }
 
-impl Environment for Line {
+impl WorldFactory for Line {
     fn seed(&self, task: Task, index: u32) -> Seed {
         Seed::from_number(5).episode(task, index)
     }

@@ -11,8 +11,8 @@ use faceoff_scoring::{
 use scraper::Selector;
 use serde_json::json;
 
-/// Five teams of the qualifying table in the challenge's paper, not in board order: name, success rates (hit, defend, prepare)
-/// and penalty points.
+/// Five teams of the qualifying table in the paper on the 2023 Robot Air Hockey Challenge, not in board order: name, success rates (hit,
+/// defend, prepare) and penalty points.
 const TEAMS: [(&str, [f64; 3], f64); 5] = [
     ("RL3_polimi", [0.227, 0.616, 0.362], 920.0),
     ("Kalash Jain", [0.0, 0.195, 0.083], 0.0),

@@ -1,6 +1,6 @@
 //! The course of all teams over the days of a board: a line in each row, and a chart of all together.
 
-use crate::{chart::TeamsChart, figures};
+use crate::{chart::TeamsChart, format};
 use faceoff_api::views::board::BoardView;
 use faceoff_service::{app::AppState, problem::Problem, views::visibility::Visibility};
 use faceoff_store::{BoardScope, DayScore};
@@ -84,7 +84,7 @@ impl Course {
         let position = |(day, score): &(Date, f64)| {
             let x = MARGIN + (WIDTH - 2.0 * MARGIN) * days(first, *day) / days(first, last);
             let y = HEIGHT - MARGIN - (HEIGHT - 2.0 * MARGIN) * (score - low) / range;
-            [x, y].map(figures::one_decimal)
+            [x, y].map(format::one_decimal)
         };
         let points: Vec<[String; 2]> = scores.iter().map(position).collect();
         let letters = std::iter::once('M').chain(std::iter::repeat('L'));

@@ -1,7 +1,7 @@
 //! The front page, above the board: what the competition is, who leads, when the next evaluation is, and how to take part.
 
 use super::rows::{Group, OverallRow};
-use crate::{assets, figures::in_words, frame::PageProblem, highlight::HighlightLoop};
+use crate::{assets, format::in_words, frame::PageProblem, highlight::HighlightLoop};
 use faceoff_api::views::board::BoardView;
 use faceoff_service::{
     app::App,

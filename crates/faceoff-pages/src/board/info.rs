@@ -3,7 +3,7 @@
 use super::address::Address;
 use crate::{
     board_status,
-    figures::{in_words, utc_minute},
+    format::{in_words, utc_minute},
     frame::PageProblem,
 };
 use faceoff_api::views::{

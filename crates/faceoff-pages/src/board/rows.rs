@@ -3,7 +3,7 @@
 use super::course::{Course, Sparkline};
 use crate::{
     board_status::shared_rank,
-    figures::{self, Rate, TierLabel},
+    format::{self, Rate, TierLabel},
 };
 use faceoff_api::views::{
     board::{BoardRow, BoardView},
@@ -159,7 +159,7 @@ impl<'a> Context<'a> {
             Some(result) => 100.0 * result.success_rate,
             None => row.score,
         };
-        let score = figures::signed(score - previous.score);
+        let score = format::signed(score - previous.score);
         Some(RankChange {
             symbol: match places {
                 0 => String::new(),
@@ -180,7 +180,7 @@ impl<'a> Context<'a> {
             tied_with: self.tied_with(row),
             tier_change: tier_change
                 .filter(|probability| *probability >= MIN_SHOWN_TIER_CHANGE)
-                .map(figures::probability),
+                .map(format::probability),
             team: row.team.to_string(),
             team_id: row.team_id,
             division: row.division.clone(),
@@ -245,8 +245,8 @@ impl OverallRow {
                 .task_names()
                 .map(|task| (task, row.tasks.get(&task).map(Rate::new)))
                 .collect(),
-            penalty_points: figures::one_decimal(row.penalty_points),
-            per_episode: figures::per_episode(row.penalty_points, episodes_per_day(row)),
+            penalty_points: format::one_decimal(row.penalty_points),
+            per_episode: format::per_episode(row.penalty_points, episodes_per_day(row)),
         }
     }
 }
@@ -278,9 +278,9 @@ impl TaskDetails {
             violations: kinds
                 .map(|info| (info.column.clone(), counts.get(info.name)))
                 .collect(),
-            mean_ms: figures::milliseconds(time.mean),
-            p99_ms: figures::milliseconds(time.p99),
-            max_ms: figures::milliseconds(time.max),
+            mean_ms: format::milliseconds(time.mean),
+            p99_ms: format::milliseconds(time.p99),
+            max_ms: format::milliseconds(time.max),
         })
     }
 }
@@ -295,8 +295,8 @@ impl TaskRow {
         Self {
             team: context.team_cell(row),
             rate: Rate::new(result),
-            penalty_points: figures::one_decimal(result.penalty_points),
-            per_episode: figures::per_episode(result.penalty_points, per_day(row, result.episodes)),
+            penalty_points: format::one_decimal(result.penalty_points),
+            per_episode: format::per_episode(result.penalty_points, per_day(row, result.episodes)),
             details: TaskDetails::new(result, competition),
         }
     }

@@ -4,7 +4,7 @@
 use super::style::colour;
 use crate::{
     assets,
-    figures::{self, one_decimal},
+    format::{self, one_decimal},
 };
 use faceoff_api::views::task::TaskView;
 use faceoff_picture::{Align, Drawing, TextStyle, Weight, text::is_legible};
@@ -215,7 +215,7 @@ impl Share {
     pub(super) fn of_score(score: f64, tasks: &TaskMap<TaskView>, weights: &TaskWeights) -> Self {
         Self {
             percent: score,
-            interval: figures::score_interval(score, tasks, weights),
+            interval: format::score_interval(score, tasks, weights),
         }
     }
 

@@ -1,7 +1,7 @@
 //! A chart of the agent's answer times: a row per task on a logarithmic axis. Lengths are in units of the drawing.
 
 use super::scale::{RIGHT, Tick, short};
-use crate::figures;
+use crate::format;
 
 /// Ends of the time axis, as powers of ten of a millisecond.
 const FIRST_DECADE: f64 = -2.0;
@@ -89,7 +89,7 @@ impl AnswerTimeChart {
                 ROW_HEIGHT
             };
             let [mean, p99, max] =
-                [summary.mean, summary.p99, summary.max].map(|ms| figures::one_decimal(x(ms)));
+                [summary.mean, summary.p99, summary.max].map(|ms| format::one_decimal(x(ms)));
             AnswerTimeRow {
                 name: summary.name.clone(),
                 y,
@@ -102,7 +102,7 @@ impl AnswerTimeChart {
         let rows = rows.collect();
         let bottom = y + ROW_HEIGHT / 2;
         let grid = [0.01, 0.1, 1.0, 10.0, 100.0, 1000.0].map(|ms| Tick {
-            position: figures::one_decimal(x(ms)),
+            position: format::one_decimal(x(ms)),
             label: short(ms),
         });
         let texts = summaries.iter().map(|summary| {
@@ -117,9 +117,9 @@ impl AnswerTimeChart {
             rows,
             grid: grid.into(),
             has_distributions,
-            limit: figures::one_decimal(x(STEP_MS)),
+            limit: format::one_decimal(x(STEP_MS)),
             noise_floor: noise_floor
-                .map(|[from, to]| [x(from), x(to) - x(from)].map(figures::one_decimal)),
+                .map(|[from, to]| [x(from), x(to) - x(from)].map(format::one_decimal)),
             bottom,
             height: bottom + 20,
             counts: count_rows(summaries),
@@ -140,8 +140,8 @@ fn count_rows(summaries: &[TimeSummary]) -> Vec<CountRow> {
         .max_by_key(|all| all.len());
     let columns = longest.into_iter().flatten().enumerate();
     let rows = columns.map(|(column, bin)| CountRow {
-        from: figures::two_significant_digits(bin.from),
-        to: figures::two_significant_digits(bin.to),
+        from: format::two_significant_digits(bin.from),
+        to: format::two_significant_digits(bin.to),
         counts: summaries
             .iter()
             .map(|summary| summary.bins.get(column).map_or(0, |bin| bin.count))
@@ -157,7 +157,7 @@ fn distribution(bins: &[TimeBin], bottom: u32) -> String {
     let max = bins.iter().map(|bin| bin.count).max().map_or(1.0, height);
     let columns = bins.iter().filter(|bin| bin.count > 0).map(|bin| {
         let top = f64::from(bottom) - DISTRIBUTION_HEIGHT * height(bin.count) / max;
-        let [left, right, top] = [x(bin.from), x(bin.to), top].map(figures::one_decimal);
+        let [left, right, top] = [x(bin.from), x(bin.to), top].map(format::one_decimal);
         format!("M{left} {bottom}V{top}H{right}V{bottom}z")
     });
     columns.collect()

@@ -1,7 +1,7 @@
 //! A chart of a value over evaluation days.
 
 use super::scale::{LEFT, RIGHT, Scale, Tick, round_up, without_trailing_zeros};
-use crate::figures;
+use crate::format;
 use jiff::civil::Date;
 
 /// A value of an evaluation day.
@@ -79,11 +79,11 @@ impl DayChart {
         let points: Vec<Point> = values
             .iter()
             .map(|value| Point {
-                x: figures::one_decimal(day_x(value)),
-                y: figures::one_decimal(scale.y(value.value)),
+                x: format::one_decimal(day_x(value)),
+                y: format::one_decimal(scale.y(value.value)),
                 interval: value
                     .interval
-                    .map(|ends| ends.map(|end| figures::one_decimal(scale.y(end)))),
+                    .map(|ends| ends.map(|end| format::one_decimal(scale.y(end)))),
                 label: label(value),
             })
             .collect();
@@ -101,7 +101,7 @@ impl DayChart {
             days: day_ticks(span),
             bounds: shown
                 .map(|bound| Tick {
-                    position: figures::one_decimal(scale.y(bound.value)),
+                    position: format::one_decimal(scale.y(bound.value)),
                     label: bound.name.to_owned(),
                 })
                 .collect(),
@@ -133,7 +133,7 @@ fn day_ticks(span: Option<(Date, Date)>) -> Vec<Tick> {
     days.dedup();
     days.into_iter()
         .map(|day| Tick {
-            position: figures::one_decimal(x(day, span)),
+            position: format::one_decimal(x(day, span)),
             label: day.to_string(),
         })
         .collect()

@@ -1,7 +1,7 @@
 //! Histograms: numbers of values in columns of equal width.
 
 use super::scale::{BOTTOM, GRID_INTERVALS, LEFT, RIGHT, Scale, Tick, short};
-use crate::figures;
+use crate::format;
 
 /// Largest number of labels below the columns; more would overlap on a phone.
 const MAX_LABELS: usize = 8;
@@ -72,7 +72,7 @@ impl Bins {
     fn edges(self) -> Vec<Tick> {
         let step = self.count.div_ceil(MAX_LABELS);
         let edges = (0..=self.count).step_by(step).map(|edge| Tick {
-            position: figures::one_decimal(self.x(edge)),
+            position: format::one_decimal(self.x(edge)),
             label: short(self.start(edge)),
         });
         edges.collect()
@@ -93,9 +93,9 @@ impl Histogram {
         };
         let filled = || counts.iter().enumerate().filter(|(_, count)| **count > 0);
         let columns = filled().map(|(column, count)| {
-            let top = figures::one_decimal(scale.y(*count as f64));
+            let top = format::one_decimal(scale.y(*count as f64));
             let [left, right] =
-                [bins.x(column) + 0.5, bins.x(column + 1) - 0.5].map(figures::one_decimal);
+                [bins.x(column) + 0.5, bins.x(column + 1) - 0.5].map(format::one_decimal);
             format!("M{left} {BOTTOM}V{top}H{right}V{BOTTOM}z")
         });
         let texts: Vec<String> = filled()

@@ -1,7 +1,7 @@
 //! A chart of success rates as bars.
 
 use super::scale::{BOTTOM, LEFT, RIGHT, Scale, Tick};
-use crate::figures;
+use crate::format;
 
 /// Width of a bar in units of the drawing.
 const BAR_WIDTH: f64 = 28.0;
@@ -76,14 +76,14 @@ impl Bar {
         Self {
             class: if rate.is_ideal { "ideal" } else { rate.name }.to_owned(),
             letter: rate.letter,
-            x: figures::one_decimal(middle - BAR_WIDTH / 2.0),
-            y: figures::one_decimal(y),
-            width: figures::one_decimal(BAR_WIDTH),
-            height: figures::one_decimal(BOTTOM - y),
-            middle: figures::one_decimal(middle),
-            low_y: figures::one_decimal(low_y),
-            high_y: figures::one_decimal(high_y),
-            label_y: figures::one_decimal(high_y - 3.0),
+            x: format::one_decimal(middle - BAR_WIDTH / 2.0),
+            y: format::one_decimal(y),
+            width: format::one_decimal(BAR_WIDTH),
+            height: format::one_decimal(BOTTOM - y),
+            middle: format::one_decimal(middle),
+            low_y: format::one_decimal(low_y),
+            high_y: format::one_decimal(high_y),
+            label_y: format::one_decimal(high_y - 3.0),
             label: format!("{:.0}", rate.percent),
         }
     }

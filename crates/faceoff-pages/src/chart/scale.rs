@@ -1,6 +1,6 @@
 //! The plot area of a chart, its value axis and number labels.
 
-use crate::figures;
+use crate::format;
 
 /// Edges of the plot in units of the drawing, which is 360 wide (`chart.html`).
 pub(super) const LEFT: f64 = 38.0;
@@ -34,7 +34,7 @@ impl Scale {
         let line = |part: u32| {
             let value = self.max * f64::from(part) / f64::from(GRID_INTERVALS);
             Tick {
-                position: figures::one_decimal(self.y(value)),
+                position: format::one_decimal(self.y(value)),
                 label: short(value),
             }
         };

@@ -1,7 +1,7 @@
 //! A chart of the score of a game over time, with the fouls of both sides.
 
 use super::scale::{BOTTOM, LEFT, RIGHT, Scale, Tick, round_up, without_trailing_zeros};
-use crate::figures;
+use crate::format;
 use faceoff_replay::model::CONTROL_STEP_S;
 
 /// Height of each of the two rows of foul marks below the plot, in units of the drawing.
@@ -40,8 +40,8 @@ impl ScoreChart {
         let mut paths = [0, 1].map(|_| {
             format!(
                 "M{} {}",
-                figures::one_decimal(LEFT),
-                figures::one_decimal(BOTTOM)
+                format::one_decimal(LEFT),
+                format::one_decimal(BOTTOM)
             )
         });
         let mut fouls = [String::new(), String::new()];
@@ -49,24 +49,24 @@ impl ScoreChart {
             for (path, score) in paths.iter_mut().zip(score) {
                 path.push_str(&format!(
                     "H{}V{}",
-                    figures::one_decimal(x(*step)),
-                    figures::one_decimal(scale.y(f64::from(*score)))
+                    format::one_decimal(x(*step)),
+                    format::one_decimal(scale.y(f64::from(*score)))
                 ));
             }
             if let Some(side) = foul_by.filter(|side| *side < 2) {
                 fouls[side].push_str(&format!(
                     "M{} {}l4 7h-8z",
-                    figures::one_decimal(x(*step)),
-                    figures::one_decimal(foul_y[side] - 4.0)
+                    format::one_decimal(x(*step)),
+                    format::one_decimal(foul_y[side] - 4.0)
                 ));
             }
         }
         for path in &mut paths {
-            path.push_str(&format!("H{}", figures::one_decimal(RIGHT)));
+            path.push_str(&format!("H{}", format::one_decimal(RIGHT)));
         }
         let minutes = f64::from(steps) * CONTROL_STEP_S / 60.0;
         let ticks = [0.0, 0.5, 1.0].map(|share| Tick {
-            position: figures::one_decimal(LEFT + share * (RIGHT - LEFT)),
+            position: format::one_decimal(LEFT + share * (RIGHT - LEFT)),
             label: without_trailing_zeros(share * minutes, 1),
         });
         let foul_count = |side: usize| {
@@ -78,7 +78,7 @@ impl ScoreChart {
         Self {
             paths,
             fouls,
-            foul_rows: foul_y.map(|y| figures::one_decimal(y + 4.0)),
+            foul_rows: foul_y.map(|y| format::one_decimal(y + 4.0)),
             minutes: ticks.into(),
             grid: scale.grid(),
             description: format!(

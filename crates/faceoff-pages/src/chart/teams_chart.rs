@@ -1,7 +1,7 @@
 //! A chart of the scores of many teams over evaluation days. The first teams have a line style and a label of their own.
 
 use super::scale::Tick;
-use crate::figures;
+use crate::format;
 use jiff::civil::Date;
 
 /// Teams with a label.
@@ -68,7 +68,7 @@ impl TeamsChart {
             let mut path = String::new();
             for (number, (day, score)) in scores.iter().enumerate() {
                 let letter = if number == 0 { 'M' } else { 'L' };
-                let [x, y] = [x(*day), y(*score)].map(figures::one_decimal);
+                let [x, y] = [x(*day), y(*score)].map(format::one_decimal);
                 path.push_str(&format!("{letter}{x} {y}"));
             }
             if scores.len() == 1 {
@@ -78,7 +78,7 @@ impl TeamsChart {
                 && index < LABELLED
             {
                 labels.push((lines.len(), y(*score)));
-                ends.push([x(*day), y(*score)].map(figures::one_decimal));
+                ends.push([x(*day), y(*score)].map(format::one_decimal));
             }
             lines.push(Line {
                 team: team.to_owned(),
@@ -95,14 +95,14 @@ impl TeamsChart {
                 style,
                 text: shortened(&line.team),
                 end,
-                y: figures::one_decimal(position),
+                y: format::one_decimal(position),
             });
         }
         Self {
             description: description(span, &lines),
             grid: [0.0, 0.25, 0.5, 0.75, 1.0]
                 .map(|part| Tick {
-                    position: figures::one_decimal(y(part * max)),
+                    position: format::one_decimal(y(part * max)),
                     label: format!("{:.0}", part * max),
                 })
                 .into(),

@@ -4,7 +4,7 @@ use crate::{
     dashboard_frame::{
         DashboardHeader, DoneQuery, EmptyForm, Notice, redirect_done, render_dashboard,
     },
-    figures::{expiry_state, utc_minute},
+    format::{expiry_state, utc_minute},
     frame::{Frame, PageProblem},
     page_auth::PageUser,
 };
@@ -163,10 +163,10 @@ fn invitation_row(view: InvitationView, names: &BTreeMap<String, String>) -> Inv
         (InvitedRole::Member, None, _) => "member".to_owned(),
         (InvitedRole::Organiser, ..) => "organiser".to_owned(),
         (InvitedRole::Founder, ..) => "first member of a new team".to_owned(),
-        (InvitedRole::Return, _, Some(person)) => {
+        (InvitedRole::PasswordReset, _, Some(person)) => {
             format!("password reset of {}", name(format!("person:{person}")))
         }
-        (InvitedRole::Return, _, None) => "password reset".to_owned(),
+        (InvitedRole::PasswordReset, _, None) => "password reset".to_owned(),
     };
     InvitationRow {
         id: view.id,
@@ -401,7 +401,7 @@ fn invitation_request(caller: &Caller, form: &InvitationForm) -> Result<NewInvit
     let role = match (caller.is_organiser(), form.role.as_str()) {
         (false, _) | (true, "member") => InvitedRole::Member,
         (true, "organiser") => InvitedRole::Organiser,
-        (true, "return") => InvitedRole::Return,
+        (true, "return") => InvitedRole::PasswordReset,
         (true, "founder") => InvitedRole::Founder,
         (true, other) => {
             let detail = format!("expected member, founder, organiser or return, got {other:?}");
@@ -413,7 +413,7 @@ fn invitation_request(caller: &Caller, form: &InvitationForm) -> Result<NewInvit
         _ => None,
     };
     let person = match role {
-        InvitedRole::Return => Some(chosen("person", &form.person)?),
+        InvitedRole::PasswordReset => Some(chosen("person", &form.person)?),
         _ => None,
     };
     Ok(NewInvitation {

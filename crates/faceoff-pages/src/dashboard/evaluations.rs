@@ -1,6 +1,6 @@
 //! The latest evaluations of a team, with what only the team sees: dataset, agent faults and log.
 
-use crate::figures::{self, utc_minute};
+use crate::format::{self, utc_minute};
 use faceoff_api::views::evaluation::{EvaluationStatus, EvaluationView};
 use faceoff_service::{
     app::AppState,
@@ -75,7 +75,7 @@ fn evaluation_row(visibility: &Visibility, view: EvaluationView) -> EvaluationRo
         EvaluationStatus::Finished {
             result, dataset, ..
         } => {
-            row.score = result.map(|result| figures::one_decimal(result.score));
+            row.score = result.map(|result| format::one_decimal(result.score));
             row.dataset = dataset.filter(|_| view.released_at.is_some());
             "finished".to_owned()
         }

@@ -1,7 +1,7 @@
 //! The last result of a team: its rank, a bar for each task, and the worst failed episodes.
 
 use crate::{
-    board_status::shared_rank, episode_text::plain_end, figures::Rate, replay::page_path,
+    board_status::shared_rank, episode_text::plain_end, format::Rate, replay::page_path,
     replay_section::Still,
 };
 use faceoff_api::{requests::BoardQuery, views::board::BoardRow};

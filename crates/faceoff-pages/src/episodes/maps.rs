@@ -1,12 +1,12 @@
 //! Start positions and violations of episodes on the table.
 
 use crate::{
-    episode_text::group_label,
-    figures,
+    episode_text::constraint_label,
+    format,
     table_drawing::{self, Dot, Position},
     violation_map::ViolationMarks,
 };
-use faceoff_replay::{EpisodeLine, Group};
+use faceoff_replay::{Constraint, EpisodeLine};
 use faceoff_types::Task;
 
 /// Largest number of marks of a map that are links: beyond, they would overlap, and make the page large.
@@ -164,12 +164,12 @@ fn success_by(
             SuccessRow {
                 range: format!(
                     "{} … {} {unit}",
-                    figures::signed(class_number * width).trim_start_matches('+'),
-                    figures::signed((class_number + 1.0) * width).trim_start_matches('+'),
+                    format::signed(class_number * width).trim_start_matches('+'),
+                    format::signed((class_number + 1.0) * width).trim_start_matches('+'),
                 ),
                 solved,
                 total: inside.len(),
-                percent: figures::percent(solved, inside.len()),
+                percent: format::percent(solved, inside.len()),
             }
         })
         .collect()
@@ -197,16 +197,22 @@ pub(super) struct Joint {
 impl ViolationMap {
     pub(super) fn new(summaries: &[&EpisodeLine]) -> Self {
         let violations = || summaries.iter().flat_map(|summary| &summary.violations);
-        let marks = ViolationMarks::by_group(|group| {
-            let matching = violations().filter(|violation| violation.group == group.name());
+        let marks = ViolationMarks::by_constraint(|constraint| {
+            let matching =
+                violations().filter(|violation| violation.constraint == constraint.name());
             matching.filter_map(|violation| violation.at).collect()
         });
         let links = summaries.iter().flat_map(|summary| {
             let violations = summary.violations.iter();
             violations.filter_map(|violation| {
-                let mut groups = Group::ALL.into_iter();
-                let group = groups.find(|group| group.name() == violation.group)?;
-                Some(EpisodeLink::new(summary, violation.at?, group_label(group)))
+                let mut constraints = Constraint::ALL.into_iter();
+                let constraint =
+                    constraints.find(|constraint| constraint.name() == violation.constraint)?;
+                Some(EpisodeLink::new(
+                    summary,
+                    violation.at?,
+                    constraint_label(constraint),
+                ))
             })
         });
         let mut links: Vec<_> = links.take(MAX_LINKS + 1).collect();
@@ -217,17 +223,17 @@ impl ViolationMap {
         if links.len() > MAX_LINKS {
             links.clear();
         }
-        let count = |group: Group, joint| {
+        let count = |constraint: Constraint, joint| {
             let matching = violations().filter(|violation| {
-                violation.group == group.name() && violation.joint == Some(joint)
+                violation.constraint == constraint.name() && violation.joint == Some(joint)
             });
             matching.count()
         };
         let joints = (1..=7)
             .map(|joint| Joint {
                 joint,
-                position: count(Group::JointPos, joint),
-                velocity: count(Group::JointVel, joint),
+                position: count(Constraint::JointPos, joint),
+                velocity: count(Constraint::JointVel, joint),
             })
             .filter(|joint| joint.position + joint.velocity > 0)
             .collect();

@@ -1,7 +1,7 @@
 //! Rows of the table of episodes.
 
 use super::still;
-use crate::{episode_text::describe_violation, figures, replay::page_path};
+use crate::{episode_text::describe_violation, format, replay::page_path};
 use faceoff_replay::EpisodeLine;
 use faceoff_types::{Competition, EvaluationId, Task};
 
@@ -44,7 +44,7 @@ impl Row {
                 .map(|violation| describe_violation(competition, violation))
                 .collect(),
             duration_s: format!("{:.2}", competition.duration_s(*task, summary.steps)),
-            slowest_ms: summary.longest_s.map(figures::milliseconds),
+            slowest_ms: summary.longest_s.map(format::milliseconds),
         }
     }
 }

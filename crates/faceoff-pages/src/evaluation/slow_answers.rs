@@ -1,6 +1,6 @@
 //! Slow answers of an evaluation: answers of the agent that came too late and cost penalty points.
 
-use crate::figures;
+use crate::format;
 use faceoff_api::views::{
     evaluation::{EvaluationView, ResultView},
     task::TaskView,
@@ -115,14 +115,14 @@ impl SlowAnswer {
         Self {
             task,
             episode: episode.episode,
-            points: figures::one_decimal(episode.points),
-            mean_ms: figures::milliseconds(episode.mean_s),
-            max_ms: figures::milliseconds(episode.max_s),
+            points: format::one_decimal(episode.points),
+            mean_ms: format::milliseconds(episode.mean_s),
+            max_ms: format::milliseconds(episode.max_s),
             step: episode.slowest.map(|slowest| SlowStepFigures {
                 step: slowest.step,
-                wall_ms: figures::milliseconds(slowest.wall_s),
-                host_ms: figures::milliseconds(slowest.host_s),
-                cpu_ms: slowest.cpu_s.map(figures::milliseconds),
+                wall_ms: format::milliseconds(slowest.wall_s),
+                host_ms: format::milliseconds(slowest.host_s),
+                cpu_ms: slowest.cpu_s.map(format::milliseconds),
             }),
         }
     }

@@ -3,12 +3,12 @@
 use super::live::{game_clock, replay_link};
 use crate::{
     chart::{Bins, Histogram},
-    episode_text::group_label,
-    figures,
+    episode_text::constraint_label,
+    format,
     table_drawing::{self, Position},
     violation_map::ViolationMarks,
 };
-use faceoff_replay::{GameAnalysis, Group, LocatedViolation, Shot, model::CONTROL_STEP_S};
+use faceoff_replay::{Constraint, GameAnalysis, LocatedViolation, Shot, model::CONTROL_STEP_S};
 
 /// Shares of the playing time in percent, per side.
 pub(super) struct Possession {
@@ -74,7 +74,7 @@ const MAX_ROWS: usize = 500;
 impl Possession {
     pub(super) fn new(analysis: &GameAnalysis) -> Self {
         let share = |steps: u32| {
-            figures::one_decimal(100.0 * f64::from(steps) / f64::from(analysis.steps.max(1)))
+            format::one_decimal(100.0 * f64::from(steps) / f64::from(analysis.steps.max(1)))
         };
         Self {
             halves: analysis.steps_in_half.map(share),
@@ -99,8 +99,8 @@ impl Shots {
             count: shots.len(),
             goals: shots.iter().filter(|shot| shot.goal).count(),
             mean_speed: fastest
-                .map(|_| figures::one_decimal(speeds().sum::<f64>() / f64::from(count))),
-            fastest_speed: fastest.map(figures::one_decimal),
+                .map(|_| format::one_decimal(speeds().sum::<f64>() / f64::from(count))),
+            fastest_speed: fastest.map(format::one_decimal),
             scored: table_drawing::dots(&positions(true)),
             others: table_drawing::crosses(&positions(false)),
             rows: shots.iter().take(MAX_ROWS).map(ShotRow::new).collect(),
@@ -139,7 +139,7 @@ impl ShotRow {
             time: game_clock(step(shot.touch_s)),
             link: replay_link(step(shot.touch_s)),
             position: position_text(shot.touch_position),
-            speed: figures::one_decimal(shot.speed_m_s),
+            speed: format::one_decimal(shot.speed_m_s),
             goal: shot.goal,
         }
     }
@@ -152,8 +152,10 @@ impl Violations {
             .iter()
             .filter(|violation| violation.side == side)
             .collect();
-        let group_positions = |group: Group| {
-            let matching = own.iter().filter(|violation| violation.group == group);
+        let constraint_positions = |constraint: Constraint| {
+            let matching = own
+                .iter()
+                .filter(|violation| violation.constraint == constraint);
             matching
                 .map(|violation| violation.mallet_position)
                 .collect()
@@ -161,14 +163,14 @@ impl Violations {
         Self {
             team: team.to_owned(),
             count: own.len(),
-            marks: ViolationMarks::by_group(group_positions),
+            marks: ViolationMarks::by_constraint(constraint_positions),
             rows: own
                 .iter()
                 .take(MAX_ROWS)
                 .map(|violation| ViolationRow {
                     time: game_clock(violation.first_sample),
                     link: replay_link(violation.first_sample),
-                    limit: group_label(violation.group),
+                    limit: constraint_label(violation.constraint),
                     duration_s: format!(
                         "{:.2}",
                         f64::from(violation.last_sample + 1 - violation.first_sample)
@@ -183,12 +185,12 @@ impl Violations {
 }
 
 fn max_excess(violation: &LocatedViolation) -> String {
-    match violation.group {
-        Group::Ee | Group::Link => {
-            format!("{} mm", figures::one_decimal(1e3 * violation.max_excess))
+    match violation.constraint {
+        Constraint::Ee | Constraint::Link => {
+            format!("{} mm", format::one_decimal(1e3 * violation.max_excess))
         }
-        Group::JointPos => format!("{:.3} rad", violation.max_excess),
-        Group::JointVel => format!("{:.3} rad/s", violation.max_excess),
+        Constraint::JointPos => format!("{:.3} rad", violation.max_excess),
+        Constraint::JointVel => format!("{:.3} rad/s", violation.max_excess),
     }
 }
 

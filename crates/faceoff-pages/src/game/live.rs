@@ -1,6 +1,6 @@
 //! The live view of a running game: score, clock, positions and events.
 
-use crate::{figures, table_drawing::Dot};
+use crate::{format, table_drawing::Dot};
 use faceoff_replay::model::CONTROL_STEP_S;
 use faceoff_service::views::live_game::LiveGameView;
 use faceoff_types::{GameEvent, Side};
@@ -37,7 +37,8 @@ impl LiveGame {
         now: Timestamp,
     ) -> Self {
         let state = &live.state;
-        let minutes = |steps: u32| figures::one_decimal(f64::from(steps) * CONTROL_STEP_S / 60.0);
+        let total_steps = state.steps;
+        let minutes = |steps: u32| format::one_decimal(f64::from(steps) * CONTROL_STEP_S / 60.0);
         let last = live.events.last().map_or(0, |last| last.step);
         let step = state.position.map_or(last, |position| position.step);
         let positions = state.position.map_or(START_POSITIONS, |position| {
@@ -50,8 +51,8 @@ impl LiveGame {
             score: state.score,
             fouls: state.fouls,
             played_min: minutes(step),
-            total_min: minutes(state.steps),
-            expected_at: expected_at(since, now, step, state.steps),
+            total_min: minutes(total_steps),
+            expected_at: expected_at(since, now, step, total_steps),
             puck,
             mallets: [home, away],
             events: events
@@ -72,12 +73,12 @@ impl LiveGame {
     }
 }
 
-fn expected_at(since: Timestamp, now: Timestamp, step: u32, steps: u32) -> Option<Timestamp> {
+fn expected_at(since: Timestamp, now: Timestamp, step: u32, total_steps: u32) -> Option<Timestamp> {
     if step < MIN_STEPS_FOR_PACE {
         return None;
     }
     let elapsed = now.duration_since(since).as_secs_f64();
-    let remaining_s = elapsed * f64::from(steps.saturating_sub(step)) / f64::from(step);
+    let remaining_s = elapsed * f64::from(total_steps.saturating_sub(step)) / f64::from(step);
     now.checked_add(SignedDuration::try_from_secs_f64(remaining_s).ok()?)
         .ok()
 }

@@ -12,7 +12,7 @@ use faceoff_api::{
     paths,
     views::game::{GameStatus, GameView},
 };
-use faceoff_replay::{GameAnalysis, Group, LocatedViolation, RallyEndKind};
+use faceoff_replay::{Constraint, GameAnalysis, LocatedViolation, RallyEndKind};
 use faceoff_service::{
     app::App,
     extract::PathParam,
@@ -58,7 +58,7 @@ struct ViolationRange {
     side: usize,
     from: u32,
     to: u32,
-    groups: Vec<Group>,
+    constraints: Vec<Constraint>,
     count: u32,
 }
 
@@ -115,7 +115,7 @@ impl GameReplay {
 }
 
 /// The course of a game as the script reads it: each end of a rally as `[sample, what, side, score, score]`, and each range of
-/// violations as `[first sample, last sample, side, groups, number]`.
+/// violations as `[first sample, last sample, side, constraints, number]`.
 fn course(analysis: &GameAnalysis) -> String {
     let ends = analysis
         .rally_ends
@@ -125,16 +125,16 @@ fn course(analysis: &GameAnalysis) -> String {
     let violations = violation_ranges(&analysis.violations)
         .into_iter()
         .map(|range| {
-            let groups: Vec<String> = range
-                .groups
+            let constraints: Vec<String> = range
+                .constraints
                 .iter()
-                .map(|group| group.name().to_string())
+                .map(|constraint| constraint.name().to_string())
                 .collect();
             json!([
                 range.from,
                 range.to,
                 range.side,
-                groups.join(" "),
+                constraints.join(" "),
                 range.count
             ])
         });
@@ -168,15 +168,15 @@ fn joined(violations: &[LocatedViolation], gap_steps: u32) -> Vec<ViolationRange
             Some(last) if violation.first_sample <= last.to.saturating_add(gap_steps) => {
                 last.to = last.to.max(violation.last_sample);
                 last.count += 1;
-                if !last.groups.contains(&violation.group) {
-                    last.groups.push(violation.group);
+                if !last.constraints.contains(&violation.constraint) {
+                    last.constraints.push(violation.constraint);
                 }
             }
             _ => ranges.push(ViolationRange {
                 side: violation.side,
                 from: violation.first_sample,
                 to: violation.last_sample,
-                groups: vec![violation.group],
+                constraints: vec![violation.constraint],
                 count: 1,
             }),
         }
@@ -188,10 +188,10 @@ fn joined(violations: &[LocatedViolation], gap_steps: u32) -> Vec<ViolationRange
 mod tests {
     use super::*;
 
-    fn violation(side: usize, group: Group, first_sample: u32) -> LocatedViolation {
+    fn violation(side: usize, constraint: Constraint, first_sample: u32) -> LocatedViolation {
         LocatedViolation {
             side,
-            group,
+            constraint,
             first_sample,
             last_sample: first_sample + 1,
             max_excess: 0.1,
@@ -202,23 +202,26 @@ mod tests {
     #[test]
     fn close_violations_of_a_side_are_one_range() {
         let ranges = violation_ranges(&[
-            violation(0, Group::Ee, 10),
-            violation(1, Group::Ee, 12),
-            violation(0, Group::JointVel, 20),
-            violation(0, Group::Ee, 900),
+            violation(0, Constraint::Ee, 10),
+            violation(1, Constraint::Ee, 12),
+            violation(0, Constraint::JointVel, 20),
+            violation(0, Constraint::Ee, 900),
         ]);
         let spans: Vec<_> = ranges
             .iter()
             .map(|range| (range.side, range.from, range.to, range.count))
             .collect();
         assert_eq!(spans, [(0, 10, 21, 2), (1, 12, 13, 1), (0, 900, 901, 1)]);
-        assert_eq!(ranges[0].groups, [Group::Ee, Group::JointVel]);
+        assert_eq!(
+            ranges[0].constraints,
+            [Constraint::Ee, Constraint::JointVel]
+        );
     }
 
     #[test]
     fn number_of_violation_ranges_is_limited() {
         let many: Vec<_> = (0..2000)
-            .map(|index| violation(0, Group::Ee, 100 * index))
+            .map(|index| violation(0, Constraint::Ee, 100 * index))
             .collect();
         let ranges = violation_ranges(&many);
         assert!(ranges.len() <= MAX_RANGES, "{} ranges", ranges.len());

@@ -8,7 +8,7 @@ use super::{
 use crate::{
     board_status,
     dashboard_frame::{self, DashboardHeader, DoneQuery, Notice},
-    figures::{self, utc_minute},
+    format::{self, utc_minute},
     frame::{Frame, PageProblem, render},
     page_auth::PageOrganiser,
 };
@@ -97,7 +97,7 @@ async fn server_items(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Prob
         Err(problem) => items.push(Item {
             class: "bad",
             title: problem.kind().title().to_owned(),
-            detail: figures::sentence(problem.detail()),
+            detail: format::sentence(problem.detail()),
             links: vec![("/organiser/storage".into(), "Storage".into())],
         }),
     }
@@ -105,7 +105,7 @@ async fn server_items(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Prob
         items.push(Item {
             class: "bad",
             title: format!("The system clock is {}", step.size()),
-            detail: figures::sentence(&step.to_string()),
+            detail: format::sentence(&step.to_string()),
             links: vec![(
                 "/organiser/decide/accept-clock".into(),
                 "Accept the clock".into(),
@@ -273,7 +273,7 @@ async fn failures(app: &App, day: StageDay) -> Result<Vec<Item>, Problem> {
         Some(Item {
             class: "bad",
             title: format!("{}’s evaluation of {} {outcome}", view.team_name, view.day),
-            detail: figures::sentence(&reason),
+            detail: format::sentence(&reason),
             links: vec![
                 (
                     format!("/organiser/decide/rerun/{}", view.id),

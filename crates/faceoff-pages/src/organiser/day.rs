@@ -3,7 +3,7 @@
 
 use crate::{
     dashboard_frame::{DashboardHeader, DoneQuery, Notice},
-    figures::{self, utc_minute},
+    format::{self, utc_minute},
     frame::{Frame, PageProblem, render},
     page_auth::PageOrganiser,
 };
@@ -104,7 +104,7 @@ fn row(view: EvaluationView, replaced: &BTreeSet<EvaluationId>) -> Row {
         EvaluationStatus::Finished { ref result, .. } => {
             let score = result
                 .as_ref()
-                .map(|result| figures::one_decimal(result.score));
+                .map(|result| format::one_decimal(result.score));
             ("finished", "good", None, score)
         }
         EvaluationStatus::AgentFailed { .. } => ("agent failed", "bad", None, None),

@@ -2,7 +2,7 @@
 
 use crate::{
     chart::{Bound, DayChart, DayValue},
-    figures::{self, Rate, TierLabel},
+    format::{self, Rate, TierLabel},
 };
 use faceoff_api::views::history::HistoryRow;
 use faceoff_types::{
@@ -31,8 +31,8 @@ impl LatestResult {
                 .tier
                 .zip(bounds)
                 .map(|(tier, bounds)| TierLabel::new(tier, &bounds)),
-            score: figures::one_decimal(row.score),
-            penalty_points: figures::one_decimal(row.penalty_points),
+            score: format::one_decimal(row.score),
+            penalty_points: format::one_decimal(row.penalty_points),
             evaluation: row.evaluation,
         }
     }
@@ -57,20 +57,20 @@ pub(super) struct DayResult {
 impl DayResult {
     pub(super) fn new(row: &HistoryRow, variation: &Variation, competition: &Competition) -> Self {
         let weights = competition.weights(variation);
-        let [low, high] = figures::score_interval(row.score, &row.tasks, &weights);
+        let [low, high] = format::score_interval(row.score, &row.tasks, &weights);
         Self {
             day: row.day,
             evaluation: row.evaluation,
             rank: row.rank,
             tier: row.tier,
-            score: figures::one_decimal(row.score),
-            score_low: figures::one_decimal(low),
-            score_high: figures::one_decimal(high),
+            score: format::one_decimal(row.score),
+            score_low: format::one_decimal(low),
+            score_high: format::one_decimal(high),
             rates: competition
                 .task_names()
                 .map(|task| row.tasks.get(&task).map(Rate::new))
                 .collect(),
-            penalty_points: figures::one_decimal(row.penalty_points),
+            penalty_points: format::one_decimal(row.penalty_points),
             per_episode: format!("{:.2}", points_per_episode(row)),
         }
     }
@@ -97,7 +97,7 @@ pub(super) fn charts(
     };
     let weights = competition.weights(variation);
     let score = rows.iter().map(|row| {
-        let interval = figures::score_interval(row.score, &row.tasks, &weights);
+        let interval = format::score_interval(row.score, &row.tasks, &weights);
         day_value(row, row.score, Some(interval))
     });
     let points = rows
@@ -168,7 +168,7 @@ pub(super) fn violations(rows: &[HistoryRow], competition: &Competition) -> Vec<
                 task,
                 episodes,
                 kinds: kinds
-                    .map(|count| figures::count_with_share(count, episodes))
+                    .map(|count| format::count_with_share(count, episodes))
                     .collect(),
             })
     };

@@ -1,7 +1,7 @@
 //! Teams of a tournament with their submissions by round.
 
 use super::schedule::is_hidden;
-use crate::{figures::utc_minute, spoilers::Spoilers, tournament_text::departure_label};
+use crate::{format::utc_minute, spoilers::Spoilers, tournament_text::departure_label};
 use faceoff_api::views::tournament::TournamentView;
 use faceoff_service::{app::AppState, problem::Problem};
 use faceoff_types::{RoundNumber, SubmissionId, TeamId, TeamName};

@@ -1,6 +1,6 @@
 //! Schedule of a tournament, round by round.
 
-use crate::{figures::utc_minute, game_row::GameRow, spoilers::Spoilers, tournament_text};
+use crate::{format::utc_minute, game_row::GameRow, spoilers::Spoilers, tournament_text};
 use faceoff_api::views::tournament::{RoundView, TournamentView};
 use faceoff_types::{RoundNumber, TeamName};
 

@@ -1,6 +1,6 @@
 //! Standings of a tournament for its page.
 
-use crate::{figures, tournament_text::departure_label};
+use crate::{format, tournament_text::departure_label};
 use faceoff_scoring::tournament::schedule::{Table, TableScope};
 use faceoff_service::{problem::Problem, views::tournament_state::TournamentState};
 use faceoff_types::{TeamId, TeamName};
@@ -63,7 +63,7 @@ impl Standings {
                     byes: standing.byes,
                     goals: [standing.goals_for, standing.goals_against],
                     difference: difference(standing.goals_for, standing.goals_against),
-                    penalty_points: figures::one_decimal(standing.penalty_points),
+                    penalty_points: format::one_decimal(standing.penalty_points),
                     departure: standing.departure.map(departure_label),
                 })
             })

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::errors::{argument_error, catch_panic, check_version};
 use faceoff_sim::{
-    ViolatedGroups,
+    ViolatedConstraints,
     game::{GameProgress, referee::Referee},
 };
 use pyo3::{
@@ -149,7 +149,7 @@ pub fn load_game(py: Python<'_>, data: &[u8]) -> PyResult<GameSnapshot> {
         },
         violations: saved
             .violations
-            .map(|[ee, link, joint_pos, joint_vel]| ViolatedGroups {
+            .map(|[ee, link, joint_pos, joint_vel]| ViolatedConstraints {
                 ee,
                 link,
                 joint_pos,

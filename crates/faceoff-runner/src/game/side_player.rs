@@ -60,7 +60,7 @@ impl SideFailure {
             fault: SideFault { kind, line },
             timing: match &wait {
                 Some(wait) => AnswerTiming {
-                    computation_time_s: wait.charged().as_secs_f64(),
+                    computation_time_s: wait.agent_time().as_secs_f64(),
                     host_time_s: wait.host_interference.as_secs_f64(),
                     cpu_time_s: wait.cpu_time_s,
                 },

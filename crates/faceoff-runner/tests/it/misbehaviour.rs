@@ -1,4 +1,4 @@
-//! Misbehaving agents in a validation: each misbehaviour is an agent fault with its own verdict.
+//! Misbehaving agents in a validation: each misbehaviour is an agent fault of its own kind.
 
 use crate::agents::{Agent, sandboxed, with_short_step_limit};
 use faceoff_airhockey::{DEFEND, HIT, TASKS};
@@ -29,7 +29,10 @@ fn report_in(agent: &Agent, env: &AgentEnvironment) -> ValidationReport {
 }
 
 /// The fault that ended the agent's validation, and the report.
-fn verdict_in(agent: &Agent, env: &AgentEnvironment) -> (AgentFaultKind, ValidationReport) {
+fn validation_fault_in(
+    agent: &Agent,
+    env: &AgentEnvironment,
+) -> (AgentFaultKind, ValidationReport) {
     let report = report_in(agent, env);
     (fault(&report).fault, report)
 }
@@ -41,8 +44,9 @@ fn fault(report: &ValidationReport) -> AgentFault {
     }
 }
 
-fn verdict(hooks: &str) -> (AgentFaultKind, ValidationReport) {
-    verdict_in(&Agent::with(hooks), &sandboxed())
+/// The same for an agent with these hooks, in the usual sandbox.
+fn validation_fault(hooks: &str) -> (AgentFaultKind, ValidationReport) {
+    validation_fault_in(&Agent::with(hooks), &sandboxed())
 }
 
 #[test]
@@ -134,7 +138,7 @@ fn exceeded_time_budget_is_a_fault() {
     let mut env = sandboxed();
     env.time.episode_extra_s = 0.5;
     let slow = Agent::with("def on_step(step, answer): time.sleep(0.3); return json.dumps(answer)");
-    let (kind, report) = verdict_in(&slow, &env);
+    let (kind, report) = validation_fault_in(&slow, &env);
     assert!(
         matches!(kind, AgentFaultKind::TimeBudget { phase: Phase::Step, used_s, limit_s }
             if used_s > limit_s && limit_s < 0.7),
@@ -146,7 +150,7 @@ fn exceeded_time_budget_is_a_fault() {
     let mut env = sandboxed();
     (env.time.resets_extra_s, env.time.reset_mean_s) = (0.5, 1e-9);
     let slow = Agent::with("def on_reset(episode): time.sleep(1.0)");
-    let (kind, report) = verdict_in(&slow, &env);
+    let (kind, report) = validation_fault_in(&slow, &env);
     assert!(
         matches!(
             kind,
@@ -179,7 +183,7 @@ fn validation_stops_when_cancelled() {
 
 #[test]
 fn invalid_answer_is_quoted() {
-    let (kind, report) = verdict("def on_step(step, answer): return 'Traceback: x'");
+    let (kind, report) = validation_fault("def on_step(step, answer): return 'Traceback: x'");
     assert!(matches!(kind, AgentFaultKind::NotJson { .. }), "{kind:?}");
     let fault = fault(&report);
     assert_eq!((fault.episode.is_some(), fault.step), (true, Some(0)));
@@ -193,7 +197,7 @@ fn invalid_answer_is_quoted() {
 
 #[test]
 fn printed_line_is_quoted() {
-    let (kind, report) = verdict("say('loading the model')");
+    let (kind, report) = validation_fault("say('loading the model')");
     assert!(matches!(kind, AgentFaultKind::NotJson { .. }), "{kind:?}");
     let fault = fault(&report);
     assert_eq!(
@@ -205,7 +209,7 @@ fn printed_line_is_quoted() {
 #[test]
 fn answer_before_the_question_is_a_fault() {
     // One write contains the first answer and the answer to a step that was not sent yet.
-    let (kind, report) = verdict(
+    let (kind, report) = validation_fault(
         "def on_step(step, answer):\n    \
          return json.dumps(answer) + '\\n' + json.dumps({**answer, 'step': step + 1})",
     );
@@ -221,8 +225,9 @@ fn answer_before_the_question_is_a_fault() {
 
 #[test]
 fn wrong_step_is_named() {
-    let (kind, _) =
-        verdict("def on_step(step, answer): return json.dumps({**answer, 'step': step + 5})");
+    let (kind, _) = validation_fault(
+        "def on_step(step, answer): return json.dumps({**answer, 'step': step + 5})",
+    );
     let AgentFaultKind::WrongMessage { expected, got } = kind else {
         panic!("{kind:?}")
     };
@@ -234,7 +239,7 @@ fn wrong_step_is_named() {
 
 #[test]
 fn wrong_shape_is_named() {
-    let (kind, _) = verdict(
+    let (kind, _) = validation_fault(
         "def on_step(step, answer): return json.dumps({**answer, 'action': [[0] * 6] * 2})",
     );
     assert_eq!(
@@ -248,7 +253,7 @@ fn wrong_shape_is_named() {
 
 #[test]
 fn nan_is_not_finite() {
-    let (kind, _) = verdict(
+    let (kind, _) = validation_fault(
         "def on_step(step, answer): return json.dumps({**answer, 'action': [[float('nan')] * 7] * 2})",
     );
     assert_eq!(kind, AgentFaultKind::NonFinite);
@@ -256,7 +261,7 @@ fn nan_is_not_finite() {
 
 #[test]
 fn too_large_number_is_named() {
-    let (kind, report) = verdict(
+    let (kind, report) = validation_fault(
         "def on_step(step, answer):\n    \
          answer['action'][1][2] = 1.7e308\n    return json.dumps(answer)",
     );
@@ -274,7 +279,7 @@ fn too_large_number_is_named() {
 #[test]
 fn silence_times_out() {
     let agent = Agent::with("def on_step(step, answer): return None");
-    let (kind, report) = verdict_in(&agent, &with_short_step_limit());
+    let (kind, report) = validation_fault_in(&agent, &with_short_step_limit());
     assert_eq!(
         kind,
         AgentFaultKind::TimedOut {
@@ -290,7 +295,7 @@ fn line_without_newline_times_out() {
     let agent = Agent::with(
         "def on_step(step, answer):\n    sys.stdout.write(json.dumps(answer)); sys.stdout.flush()",
     );
-    let (kind, _) = verdict_in(&agent, &with_short_step_limit());
+    let (kind, _) = validation_fault_in(&agent, &with_short_step_limit());
     assert_eq!(
         kind,
         AgentFaultKind::TimedOut {
@@ -302,7 +307,7 @@ fn line_without_newline_times_out() {
 
 #[test]
 fn endless_line_is_too_long() {
-    let (kind, report) = verdict(
+    let (kind, report) = validation_fault(
         "def on_step(step, answer):\n    sys.stdout.write('x' * 200_000); sys.stdout.flush()",
     );
     assert_eq!(
@@ -320,18 +325,19 @@ fn closed_output_is_a_fault() {
     let mut env = sandboxed();
     // The agent never exits, so a short wait for its exit is enough.
     env.time.bye_s = 0.5;
-    let (kind, _) = verdict_in(&agent, &env);
+    let (kind, _) = validation_fault_in(&agent, &env);
     assert_eq!(kind, AgentFaultKind::ClosedOutput);
 }
 
 #[test]
 fn exits_and_signals_are_distinguished() {
-    let (kind, report) = verdict("def on_step(step, answer): raise ValueError('my bug')");
+    let (kind, report) = validation_fault("def on_step(step, answer): raise ValueError('my bug')");
     assert_eq!(kind, AgentFaultKind::Exited { code: 1 });
     assert!(report.log.contains("ValueError: my bug"), "{}", report.log);
-    let (kind, _) = verdict("import ctypes\ndef on_step(step, answer): ctypes.string_at(0)");
+    let (kind, _) =
+        validation_fault("import ctypes\ndef on_step(step, answer): ctypes.string_at(0)");
     assert_eq!(kind, AgentFaultKind::Signalled { signal: 11 });
-    let (kind, report) = verdict("def on_reset(episode): sys.exit(0)");
+    let (kind, report) = validation_fault("def on_reset(episode): sys.exit(0)");
     assert_eq!(kind, AgentFaultKind::Exited { code: 0 });
     let fault = fault(&report);
     assert_eq!((fault.episode.is_some(), fault.step), (true, None));
@@ -346,14 +352,14 @@ fn wrong_ready_is_named() {
             "ready with interpolation \"cubic\"",
         ),
     ] {
-        let (kind, _) = verdict(hooks);
+        let (kind, _) = validation_fault(hooks);
         let AgentFaultKind::WrongMessage { got, .. } = kind else {
             panic!("{kind:?}")
         };
         assert_eq!(got, expected_got);
     }
     let agent = Agent::behaving().manifest(|manifest| manifest.interpolation = Some(5));
-    let (kind, _) = verdict_in(&agent, &sandboxed());
+    let (kind, _) = validation_fault_in(&agent, &sandboxed());
     let AgentFaultKind::WrongMessage { expected, got } = kind else {
         panic!("{kind:?}")
     };
@@ -364,8 +370,9 @@ fn wrong_ready_is_named() {
 #[test]
 fn memory_use_exceeds_the_limit() {
     // The agent exceeds the limit before it answers, so the step cannot end in another way.
-    let (kind, _) =
-        verdict("def on_step(step, answer):\n    hoard = [b'x' * (1 << 20) for _ in range(600)]");
+    let (kind, _) = validation_fault(
+        "def on_step(step, answer):\n    hoard = [b'x' * (1 << 20) for _ in range(600)]",
+    );
     let AgentFaultKind::LimitExceeded { limit, .. } = &kind else {
         panic!("{kind:?}")
     };
@@ -373,9 +380,9 @@ fn memory_use_exceeds_the_limit() {
 }
 
 #[test]
-fn fork_bomb_ends_in_a_verdict() {
+fn fork_bomb_ends_in_an_agent_fault() {
     // Every child keeps forking and none exits, so a fork of the agent itself fails eventually.
-    let (kind, report) = verdict(
+    let (kind, report) = validation_fault(
         "import signal\n\
          def on_step(step, answer):\n    \
          agent = os.getpid()\n    \
@@ -398,13 +405,13 @@ fn fork_bomb_ends_in_a_verdict() {
 fn unstartable_command_or_runtime_is_named() {
     let missing =
         Agent::behaving().manifest(|manifest| manifest.command = vec!["./no-such-program".into()]);
-    let (kind, _) = verdict_in(&missing, &sandboxed());
+    let (kind, _) = validation_fault_in(&missing, &sandboxed());
     assert!(
         matches!(&kind, AgentFaultKind::CannotStart { detail } if detail.contains("no-such-program")),
         "{kind:?}"
     );
     let runtime = Agent::behaving().manifest(|manifest| manifest.runtime = "matlab".into());
-    let (kind, _) = verdict_in(&runtime, &sandboxed());
+    let (kind, _) = validation_fault_in(&runtime, &sandboxed());
     let AgentFaultKind::CannotStart { detail } = kind else {
         panic!("{kind:?}")
     };

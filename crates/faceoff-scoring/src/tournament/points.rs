@@ -3,7 +3,7 @@
 use crate::episode::COMPUTATION_TIME_MAX_POINTS;
 use faceoff_types::{ViolationName, Violations};
 
-/// Penalty points for an end effector outside its bounds (paper §2.2).
+/// Penalty points for an end effector outside its bounds (paper on the 2023 Robot Air Hockey Challenge, §2.2).
 pub const EE_POINTS: f64 = 3.0;
 /// Penalty points for an elbow or wrist that is too low (reference implementation; not in the paper).
 pub const LINK_POINTS: f64 = 3.0;
@@ -15,7 +15,7 @@ pub const JOINT_VEL_POINTS: f64 = 1.0;
 pub const MAX_EPISODE_PENALTY: f64 =
     EE_POINTS + LINK_POINTS + JOINT_POS_POINTS + JOINT_VEL_POINTS + COMPUTATION_TIME_MAX_POINTS;
 
-/// The kinds of violations with their points, in the order of tables.
+/// The kinds of violations with their points, in display order.
 const POINTS: [(ViolationName, f64); 4] = [
     (ViolationName::new("ee"), EE_POINTS),
     (ViolationName::new("link"), LINK_POINTS),
@@ -23,7 +23,7 @@ const POINTS: [(ViolationName, f64); 4] = [
     (ViolationName::new("joint_vel"), JOINT_VEL_POINTS),
 ];
 
-/// All kinds of violations, in the order of tables.
+/// All kinds of violations, in display order.
 pub(crate) fn violation_names() -> impl Iterator<Item = ViolationName> {
     let of_the_robot = POINTS.into_iter().map(|(name, _)| name);
     of_the_robot.chain([ViolationName::COMPUTATION_TIME])

@@ -18,22 +18,22 @@ pub enum GameResult {
     Drawn(DrawReason),
 }
 
-/// Why a side won. `led` is true if the winner also had the higher final score before forfeits.
+/// Why a side won.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WinReason {
     /// Neither side was non-deployable, and the winner had the higher final score.
     Score,
     /// The other side was non-deployable.
     Tier {
-        /// Whether the winner had the higher score.
-        led: bool,
+        /// Whether the winner also had the higher final score before forfeits.
+        had_higher_score: bool,
     },
     /// The other side forfeited.
     Forfeit {
         /// The limit that the other side exceeded.
         cause: Forfeit,
-        /// Whether the winner had the higher score.
-        led: bool,
+        /// Whether the winner also had the higher final score before forfeits.
+        had_higher_score: bool,
     },
 }
 
@@ -77,7 +77,10 @@ impl GameResult {
         match self {
             Self::Won { reason, .. } => Some(match reason {
                 WinReason::Score => true,
-                WinReason::Tier { led } | WinReason::Forfeit { led, .. } => led,
+                WinReason::Tier { had_higher_score }
+                | WinReason::Forfeit {
+                    had_higher_score, ..
+                } => had_higher_score,
             }),
             Self::Drawn(_) => None,
         }
@@ -93,19 +96,24 @@ impl fmt::Display for GameResult {
             Self::Drawn(DrawReason::BothForfeit) => return f.pad("both forfeited"),
             Self::Won { reason, .. } => reason,
         };
-        let (text, led) = match reason {
+        let (text, had_higher_score) = match reason {
             WinReason::Score => return f.pad("higher score"),
-            WinReason::Tier { led } => ("the other side is non-deployable", led),
+            WinReason::Tier { had_higher_score } => {
+                ("the other side is non-deployable", had_higher_score)
+            }
             WinReason::Forfeit {
                 cause: Forfeit::Faults,
-                led,
-            } => ("the other side forfeited: too many faults", led),
+                had_higher_score,
+            } => (
+                "the other side forfeited: too many faults",
+                had_higher_score,
+            ),
             WinReason::Forfeit {
                 cause: Forfeit::Time,
-                led,
-            } => ("the other side forfeited: out of time", led),
+                had_higher_score,
+            } => ("the other side forfeited: out of time", had_higher_score),
         };
-        if *led {
+        if *had_higher_score {
             f.pad(text)
         } else {
             f.pad(&format!("{text}; the winner did not lead"))

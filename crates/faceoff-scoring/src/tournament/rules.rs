@@ -70,11 +70,18 @@ pub fn forfeit_score(
 /// a draw. Otherwise the higher final score wins; equal scores are a draw.
 #[must_use]
 pub fn judge(game: &GameTally) -> GameResult {
-    let led = |side: Side| game.score[side as usize] > game.score[side.other() as usize];
+    let had_higher_score =
+        |side: Side| game.score[side as usize] > game.score[side.other() as usize];
     let won = |winner, reason| GameResult::Won { winner, reason };
     let won_by_forfeit = |winner, cause| {
-        let led = led(winner);
-        won(winner, WinReason::Forfeit { cause, led })
+        let had_higher_score = had_higher_score(winner);
+        won(
+            winner,
+            WinReason::Forfeit {
+                cause,
+                had_higher_score,
+            },
+        )
     };
     match game.forfeits {
         [Some(_), Some(_)] => return GameResult::Drawn(DrawReason::BothForfeit),
@@ -82,7 +89,14 @@ pub fn judge(game: &GameTally) -> GameResult {
         [Some(cause), None] => return won_by_forfeit(Side::Away, cause),
         [None, None] => {}
     }
-    let won_by_tier = |winner| won(winner, WinReason::Tier { led: led(winner) });
+    let won_by_tier = |winner| {
+        won(
+            winner,
+            WinReason::Tier {
+                had_higher_score: had_higher_score(winner),
+            },
+        )
+    };
     match game
         .penalty_points
         .map(|points| tier_of(points, game.windows) != Tier::NonDeployable)
@@ -140,7 +154,7 @@ mod tests {
     #[test]
     fn tier_takes_precedence_over_score() {
         let won = |winner, reason| GameResult::Won { winner, reason };
-        let tier = |led| WinReason::Tier { led };
+        let tier = |had_higher_score| WinReason::Tier { had_higher_score };
         for (score, penalty_points, expected) in [
             ([3, 2], [135.0, 135.0], won(Home, WinReason::Score)),
             ([2, 3], [0.0, 134.5], won(Away, WinReason::Score)),
@@ -179,7 +193,7 @@ mod tests {
                     winner: Home,
                     reason: WinReason::Forfeit {
                         cause: Forfeit::Faults,
-                        led: false,
+                        had_higher_score: false,
                     },
                 },
                 [10, 0],
@@ -190,7 +204,7 @@ mod tests {
                     winner: Away,
                     reason: WinReason::Forfeit {
                         cause: Forfeit::Time,
-                        led: true,
+                        had_higher_score: true,
                     },
                 },
                 [0, 10],

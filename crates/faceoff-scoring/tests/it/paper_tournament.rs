@@ -75,9 +75,9 @@ fn tier_decided_19_games_and_9_winners_did_not_lead() {
         let [home, away] = game.teams().map(|team| team.as_str());
         match game.result() {
             GameResult::Won {
-                reason: WinReason::Tier { led },
+                reason: WinReason::Tier { had_higher_score },
                 ..
-            } => by_tier.push((game.round(), home, away, led)),
+            } => by_tier.push((game.round(), home, away, had_higher_score)),
             GameResult::Won {
                 reason: WinReason::Score,
                 ..
@@ -87,7 +87,13 @@ fn tier_decided_19_games_and_9_winners_did_not_lead() {
         }
     }
     assert_eq!(by_tier, BY_TIER);
-    assert_eq!(by_tier.iter().filter(|(.., led)| !led).count(), 9);
+    assert_eq!(
+        by_tier
+            .iter()
+            .filter(|(.., had_higher_score)| !had_higher_score)
+            .count(),
+        9
+    );
     assert_eq!(
         others,
         [13, 4],

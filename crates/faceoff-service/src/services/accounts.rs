@@ -21,7 +21,7 @@ const MAX_AFFILIATION_CHARS: usize = 120;
 /// When an invitation that is created now expires by default.
 pub(crate) fn default_expiry(role: InvitedRole, now: Timestamp) -> Timestamp {
     let validity = match role {
-        InvitedRole::Return => RETURN_VALIDITY,
+        InvitedRole::PasswordReset => RETURN_VALIDITY,
         InvitedRole::Organiser | InvitedRole::Member | InvitedRole::Founder => DEFAULT_VALIDITY,
     };
     now.saturating_add(validity).unwrap_or(Timestamp::MAX)

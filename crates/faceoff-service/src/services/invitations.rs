@@ -51,7 +51,7 @@ fn invitation_role(
     if new.role != InvitedRole::Member {
         check_absent("team", new.team.is_some())?;
     }
-    if new.role != InvitedRole::Return {
+    if new.role != InvitedRole::PasswordReset {
         check_absent("person", new.person.is_some())?;
     }
     let forbidden = |detail: &str| Err(Problem::new(ProblemKind::Forbidden, detail));
@@ -69,7 +69,7 @@ fn invitation_role(
         (_, InvitedRole::Member) => new.team.map(InvitationRole::Member).ok_or_else(|| {
             Problem::invalid("team", "expected the id of the invited member's team")
         }),
-        (_, InvitedRole::Return) => new
+        (_, InvitedRole::PasswordReset) => new
             .person
             .map(InvitationRole::PasswordReset)
             .ok_or_else(|| Problem::invalid("person", "expected the id of the returning user")),
@@ -107,7 +107,7 @@ pub async fn create_invitation(
         .expires_at
         .unwrap_or_else(|| default_expiry(new.role, now));
     let max_validity = match new.role {
-        InvitedRole::Return => RETURN_VALIDITY,
+        InvitedRole::PasswordReset => RETURN_VALIDITY,
         InvitedRole::Organiser | InvitedRole::Member | InvitedRole::Founder => MAX_VALIDITY,
     };
     if now.duration_until(expires_at) > max_validity {

@@ -1,4 +1,4 @@
-//! Replays of a tournament: its whole schedule is played again, several times, with other seeds. The share of replays that each team
+//! Replays of a tournament's schedule: repetitions of all its games with other seeds. The share of them that each team
 //! wins estimates how certain the champion is.
 
 use crate::{

@@ -4,7 +4,7 @@ use faceoff_types::{Task, UnknownTask};
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
 
-/// A task of the qualifying stage (paper §2.1).
+/// A task of the qualifying stage (paper on the 2023 Robot Air Hockey Challenge, §2.1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum AirHockeyTask {

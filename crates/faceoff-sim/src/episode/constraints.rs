@@ -1,5 +1,5 @@
-//! The constraints on a robot's motion, whose violation costs penalty points (`docs/rules.md`, "Penalty points"). They form four groups:
-//! joint positions, joint velocities, end effector (the tip of the arm, which carries the mallet) and links.
+//! The constraints on a robot's motion, whose violation costs penalty points (`docs/rules.md`, "Penalty points"). There are
+//! four: on the joint positions, the joint velocities, the end effector (the tip of the arm, which carries the mallet) and the links.
 
 use crate::{
     dynamics::arm::Kinematics,
@@ -24,7 +24,7 @@ pub const HEIGHT_TOLERANCE_M: f64 = 0.02;
 /// Least height of elbow and wrist in the robot's base frame, m.
 pub const LINK_HEIGHT_M: f64 = 0.25;
 
-/// For each group of constraints, the largest excess over a bound. A group is violated if its value is above 0. Joint positions are in rad,
+/// For each constraint, the largest excess over one of its bounds. A constraint is violated if its value is above 0. Joint positions are in rad,
 /// joint velocities in rad/s, the others in m.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ConstraintValues {
@@ -89,8 +89,8 @@ impl ConstraintValues {
         values
     }
 
-    /// Sets the flags of the violated groups in `violations`; other flags are kept.
-    pub fn mark(&self, violations: &mut ViolatedGroups) {
+    /// Sets the flags of the violated constraints in `violations`; other flags are kept.
+    pub fn mark(&self, violations: &mut ViolatedConstraints) {
         violations.ee |= self.ee > 0.0;
         violations.link |= self.link > 0.0;
         violations.joint_pos |= self.joint_pos > 0.0;
@@ -98,9 +98,9 @@ impl ConstraintValues {
     }
 }
 
-/// Which groups of constraints the robot's motion violated at least once.
+/// Which constraints the robot's motion violated at least once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub struct ViolatedGroups {
+pub struct ViolatedConstraints {
     /// End-effector position.
     pub ee: bool,
     /// Elbow and wrist height.
@@ -111,15 +111,15 @@ pub struct ViolatedGroups {
     pub joint_vel: bool,
 }
 
-/// Under the names of the competition, in the order of its tables.
-impl From<ViolatedGroups> for Violations {
-    fn from(groups: ViolatedGroups) -> Self {
-        let ViolatedGroups {
+/// Under the names of the competition, in its display order.
+impl From<ViolatedConstraints> for Violations {
+    fn from(violated: ViolatedConstraints) -> Self {
+        let ViolatedConstraints {
             ee,
             link,
             joint_pos,
             joint_vel,
-        } = groups;
+        } = violated;
         let named = [
             (EE, ee),
             (LINK, link),

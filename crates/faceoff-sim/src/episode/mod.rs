@@ -1,4 +1,4 @@
-//! *Episodes*: attempts of one agent at one of the qualifying tasks (`hit`, `defend`, `prepare`), in control steps of 20 ms.
+//! *Episodes*: attempts of one agent at one of the tasks (`hit`, `defend`, `prepare`), in control steps of 20 ms.
 
 mod air_hockey_task;
 pub mod constraints;
@@ -14,14 +14,14 @@ use crate::{
     Factors,
     channel::{AgentChannel, Command, observation},
     model::JOINTS,
-    perturbation::table_factors::TableFactors,
+    perturbation::table_perturbations::TablePerturbations,
     robot::plant::Plant,
     stream::RandomStream,
     table::puck::Puck,
     world::{Bounds, Divergence, World},
 };
 use crate::{Interpolation, PerturbationSettings};
-use constraints::{ConstraintValues, ViolatedGroups};
+use constraints::{ConstraintValues, ViolatedConstraints};
 use faceoff_types::{EpisodeEnd, Seed};
 use opponent::Opponent;
 
@@ -32,12 +32,12 @@ pub struct Episode {
     world: World,
     opponent: Option<Opponent>,
     channel: AgentChannel,
-    table: TableFactors,
+    table: TablePerturbations,
     /// Control steps so far.
     steps: u32,
     puck_lost: bool,
     /// Constraints violated so far.
-    violations: ViolatedGroups,
+    violations: ViolatedConstraints,
 }
 
 impl Episode {
@@ -70,7 +70,7 @@ impl Episode {
     ) -> Self {
         let opponent = (task == AirHockeyTask::Hit).then(Opponent::new);
         let mut world = World::with_robots(plant, if opponent.is_some() { 2 } else { 1 }, puck);
-        let table = TableFactors::new(factors, settings, &seed, &mut world);
+        let table = TablePerturbations::new(factors, settings, &seed, &mut world);
         Self {
             task,
             channel: AgentChannel::new(0, interpolation, factors, settings, &seed, &world),
@@ -79,7 +79,7 @@ impl Episode {
             table,
             steps: 0,
             puck_lost: false,
-            violations: ViolatedGroups::default(),
+            violations: ViolatedConstraints::default(),
         }
     }
 
@@ -165,7 +165,7 @@ impl Episode {
 
     /// Constraints violated so far.
     #[must_use]
-    pub fn violations(&self) -> ViolatedGroups {
+    pub fn violations(&self) -> ViolatedConstraints {
         self.violations
     }
 

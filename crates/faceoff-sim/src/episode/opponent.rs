@@ -1,4 +1,5 @@
-//! The opponent in the task `hit`: robot 2, whose end effector follows a fixed figure of eight, as in the challenge's own simulator.
+//! The opponent in the task `hit`: robot 2, whose end effector follows a fixed figure of eight, as in the simulator of the 2023 Robot Air
+//! Hockey Challenge.
 
 use crate::{
     model::{CONTROL_STEP_S, EE_DESIRED_HEIGHT_M, INITIAL_Q, JOINTS},

@@ -1,4 +1,4 @@
-//! The three qualifying tasks: the puck's initial state, the end of an episode, and success (`docs/rules.md`, "What is played"). In `hit`
+//! The three tasks: the puck's initial state, the end of an episode, and success (`docs/rules.md`, "What is played"). In `hit`
 //! the agent scores a goal, in `defend` it stops an incoming puck, in `prepare` it moves a resting puck into a good position.
 
 use crate::AirHockeyTask;

@@ -11,10 +11,10 @@ use crate::{
     Factors,
     channel::{AgentChannel, Command, observation::OBSERVATION_WITH_OPPONENT_LEN},
     episode::{
-        constraints::{ConstraintValues, ViolatedGroups},
+        constraints::{ConstraintValues, ViolatedConstraints},
         task::PLAYABLE_Y_M,
     },
-    perturbation::table_factors::TableFactors,
+    perturbation::table_perturbations::TablePerturbations,
     robot::plant::Plant,
     stream::RandomStream,
     world::{Bounds, Divergence, Impacts, World},
@@ -48,7 +48,7 @@ pub struct Game {
     /// Control steps so far.
     steps: u32,
     /// Constraints that each robot violated in the current window.
-    violations: [ViolatedGroups; 2],
+    violations: [ViolatedConstraints; 2],
 }
 
 /// What a rally inherits from the game before it. With the game's setup it determines the start of the rally.
@@ -61,7 +61,7 @@ pub struct GameProgress {
     /// Goals and fouls before the rally, and who serves.
     pub referee: Referee,
     /// Constraints that each robot violated in the current window before the rally.
-    pub violations: [ViolatedGroups; 2],
+    pub violations: [ViolatedConstraints; 2],
 }
 
 /// State that is created for each rally.
@@ -70,7 +70,7 @@ struct Rally {
     number: u32,
     world: World,
     channels: [AgentChannel; 2],
-    table: TableFactors,
+    table: TablePerturbations,
 }
 
 /// Result of a control step of a game. Pairs list robot 1 first.
@@ -82,7 +82,7 @@ pub struct GameStep {
     /// Constraint values after this step; if it ended the rally, still those of the ended rally.
     pub constraints: [ConstraintValues; 2],
     /// The constraints that each robot violated in the window that ends with this step; `None` if no window ends.
-    pub window: Option<[ViolatedGroups; 2]>,
+    pub window: Option<[ViolatedConstraints; 2]>,
     /// The true state after this step; if it ended the rally, still that of the ended rally.
     pub state: GameState,
     /// Set if this step ended the rally by divergence (the world's state would have left the bounds of the simulation).
@@ -106,7 +106,7 @@ impl Game {
             referee: Referee::new(serving_robot),
             rally,
             steps: 0,
-            violations: [ViolatedGroups::default(); 2],
+            violations: [ViolatedConstraints::default(); 2],
         }
     }
 
@@ -255,7 +255,7 @@ impl Rally {
         let x = if serving_robot == 0 { -x } else { x };
         let mut world = World::with_robots(&setup.plant, 2, [x, y, 0.0, 0.0, 0.0, 0.0]);
         world.set_bounds(bounds);
-        let table = TableFactors::new(setup.factors, &setup.settings, &seed, &mut world);
+        let table = TablePerturbations::new(setup.factors, &setup.settings, &seed, &mut world);
         let channels = [0, 1].map(|robot| {
             let interpolation = setup.interpolation[robot];
             AgentChannel::new(

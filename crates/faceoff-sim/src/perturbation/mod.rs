@@ -7,7 +7,7 @@ pub mod noise;
 mod profile;
 pub mod rehearsal_table;
 mod settings;
-pub mod table_factors;
+pub mod table_perturbations;
 pub mod tracking_loss;
 
 pub use profile::{AirHockeyProfile, Factor, Factors};

@@ -1,7 +1,7 @@
 //! The torque controller of the arm, at 1 kHz: feedback on position and velocity, plus the *feed-forward*, the torques that the nominal
 //! model needs for the desired acceleration. Before it, a *limiter* keeps the commands within the limits of position and velocity. It
 //! computes several arms at once in SIMD lanes ([`Lanes`]: one number per arm). `q` are joint positions (rad), `dq` velocities (rad/s).
-//! Constants marked "reference" are those of the challenge's own simulator.
+//! Constants marked "reference" are those of the simulator of the 2023 Robot Air Hockey Challenge.
 
 use super::{plant::PlantLanes, trajectory::Setpoint};
 use crate::{

@@ -1,5 +1,5 @@
 //! Damped least-squares inverse kinematics: joint positions for a position of the end effector, the tip of the arm's rod. The method and
-//! its constants are those of the *reference*, the challenge's own simulator.
+//! its constants are those of the *reference*, the simulator of the 2023 Robot Air Hockey Challenge.
 
 use crate::{
     dynamics::{arm::Kinematics, spatial::Vec3},

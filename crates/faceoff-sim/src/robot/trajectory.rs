@@ -1,5 +1,6 @@
 //! Interpolation of an agent's action, which comes at 50 Hz, to the desired motion at 1 kHz. `docs/protocol.md` ("Actions") says what the
-//! rows of an action are in each interpolation; the polynomials are those of the *reference*, the challenge's own simulator.
+//! rows of an action are in each interpolation; the polynomials are those of the *reference*, the simulator of the 2023 Robot Air Hockey
+//! Challenge.
 //!
 //! Symbols: `T` is the duration of a control step (s), `j` a joint; p, v and a are the position (rad), velocity (rad/s) and acceleration
 //! (rad/s²) at the start of the step, which is the end of the previous trajectory.

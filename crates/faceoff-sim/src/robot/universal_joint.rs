@@ -1,5 +1,5 @@
 //! The controller of the *universal joint*, the two hinges between end effector and mallet: it keeps the mallet vertical. Its constants
-//! are those of the *reference*, the challenge's own simulator. Vectors are in the robot's base frame.
+//! are those of the *reference*, the simulator of the 2023 Robot Air Hockey Challenge. Vectors are in the robot's base frame.
 
 use crate::dynamics::{
     angles,

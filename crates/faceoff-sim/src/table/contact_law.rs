@@ -1,4 +1,4 @@
-//! The law of soft contacts, as in MuJoCo, with the constants of the challenge's own simulator.
+//! The law of soft contacts, as in MuJoCo, with the constants of the simulator of the 2023 Robot Air Hockey Challenge.
 //!
 //! A *constraint* wants the acceleration `stiffness · impedance · depth − damping · velocity`, where the *depth* of the overlap is the
 //! constraint's error. The *impedance*, between 0 and 1, rises with the depth; the nearer it is to 1, the less the *regularisation* lets

@@ -34,7 +34,7 @@ impl Table {
     }
 }
 
-/// The table of the challenge, in its last published version.
+/// The table of the 2023 Robot Air Hockey Challenge, in its last published version.
 pub const TABLE: Table = Table {
     length_m: 1.948,
     width_m: 1.038,

@@ -134,8 +134,8 @@ impl Contacts {
         let regularisation = Material::softness(impedance) * material.inverse_inertia;
         // Part of the target that comes from the depth, m/s².
         let push = material.stiffness_per_s2 * impedance * touch.depth_m;
-        // Two choices match the recordings of the challenge's own simulator. The force acts inside the overlap, which is
-        // millimetres deep. And there is an upright tangent: the puck does not move along z, but its friction
+        // Two choices match the recordings of the simulator of the 2023 Robot Air Hockey Challenge. The force acts inside the overlap,
+        // which is millimetres deep. And there is an upright tangent: the puck does not move along z, but its friction
         // brakes a mallet that does, and shares the friction cone with the horizontal tangent.
         let scale = 1.0 / (n[0] * n[0] + n[1] * n[1]).sqrt();
         let horizontal = [-n[1] * scale, n[0] * scale, 0.0];

@@ -194,7 +194,7 @@ impl World {
     }
 
     /// Position of a robot's end effector before the last substep, m, in its own base frame. The observation of the opponent shows it,
-    /// as in the challenge's own simulator.
+    /// as in the simulator of the 2023 Robot Air Hockey Challenge.
     #[must_use]
     pub fn end_effector_before(&self, robot: usize) -> [f64; 3] {
         self.arms[robot].ee_before

@@ -1,5 +1,5 @@
-//! Motions of the arm in all interpolations match the recording `arm_tracking` of the *reference*, the challenge's own simulator. `q` are
-//! joint positions (rad), `dq` velocities (rad/s), `ee` is the end effector (m).
+//! Motions of the arm in all interpolations match the recording `arm_tracking` of the *reference*, the simulator of the 2023 Robot Air
+//! Hockey Challenge. `q` are joint positions (rad), `dq` velocities (rad/s), `ee` is the end effector (m).
 
 use crate::reference::{array, flat, max_difference, recording};
 use faceoff_sim::{ConstraintValues, Interpolation, Plant, SUBSTEPS, World};

@@ -1,11 +1,11 @@
-//! Games between two agents: goals, fouls and stuck pucks match the recording `game_rules` of the *reference* (the challenge's own
-//! simulator), and the rules of `docs/rules.md` ("Tournament") hold. A *rally* lasts from a serve to a goal, a foul or another end.
+//! Games between two agents: goals, fouls and stuck pucks match the recording `game_rules` of the *reference* (the simulator of the
+//! 2023 Robot Air Hockey Challenge), and the rules of `docs/rules.md` ("Tournament") hold. A *rally* lasts from a serve to a goal, a foul or another end.
 //! Robots are 0 and 1.
 
 use crate::reference::{array, cases, max_difference};
 use faceoff_sim::{
     Command, Factors, Game, GameSetup, Interpolation, PerturbationSettings, Plant, RallyEnd,
-    ViolatedGroups, World,
+    ViolatedConstraints, World,
     game::referee::Referee,
     golden::game_hash,
     model::{EE_DESIRED_HEIGHT_M, INITIAL_Q},
@@ -202,10 +202,10 @@ fn window_counts_a_violation_once() {
     }
     assert_eq!(windows.len(), 2);
     for [first, second] in windows {
-        assert_eq!(first, ViolatedGroups::default());
-        let lifted = ViolatedGroups {
+        assert_eq!(first, ViolatedConstraints::default());
+        let lifted = ViolatedConstraints {
             ee: true,
-            ..ViolatedGroups::default()
+            ..ViolatedConstraints::default()
         };
         assert_eq!(second, lifted);
     }

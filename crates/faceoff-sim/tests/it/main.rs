@@ -1,4 +1,5 @@
-//! Tests of the simulator: against recordings of the *reference* (the challenge's own simulator), and of its own guarantees.
+//! Tests of the simulator: against recordings of the *reference* (the simulator of the 2023 Robot Air Hockey Challenge), and of its own
+//! guarantees.
 
 #![expect(
     clippy::print_stdout,

@@ -1,5 +1,5 @@
-//! Impacts of a mallet on the puck match the recording `mallet_impact` of the *reference*, the challenge's own simulator. In some the
-//! mallet's motion is *imposed*: taken from the recording instead of simulated.
+//! Impacts of a mallet on the puck match the recording `mallet_impact` of the *reference*, the simulator of the 2023 Robot Air Hockey
+//! Challenge. In some the mallet's motion is *imposed*: taken from the recording instead of simulated.
 
 use crate::{reference::quantile, replay::impacts};
 

@@ -1,8 +1,9 @@
-//! The success rate of an agent that holds still agrees with that in the *reference*, the challenge's own simulator.
+//! The success rate of an agent that holds still agrees with that in the *reference*, the simulator of the 2023 Robot Air Hockey Challenge.
 
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
-    Episode, Factors, Interpolation, PerturbationSettings, Plant, ViolatedGroups, model::INITIAL_Q,
+    Episode, Factors, Interpolation, PerturbationSettings, Plant, ViolatedConstraints,
+    model::INITIAL_Q,
 };
 use faceoff_types::Seed;
 
@@ -21,7 +22,7 @@ fn play_holding(task: AirHockeyTask, episodes: u32) -> (u32, u32) {
         );
         while episode.step(&action[..14]).end.is_none() {}
         successes += u32::from(episode.success());
-        violations += u32::from(episode.violations() != ViolatedGroups::default());
+        violations += u32::from(episode.violations() != ViolatedConstraints::default());
     }
     (successes, violations)
 }

@@ -1,5 +1,5 @@
-//! Slides and bounces of the puck match the recordings `puck_slide` and `rim_bounce` of the *reference*, the challenge's own simulator.
-//! *Rims* are the walls of the table. States are [x, y, yaw, vx, vy, yaw rate] in the table frame, in SI units.
+//! Slides and bounces of the puck match the recordings `puck_slide` and `rim_bounce` of the *reference*, the simulator of the 2023 Robot
+//! Air Hockey Challenge. *Rims* are the walls of the table. States are [x, y, yaw, vx, vy, yaw rate] in the table frame, in SI units.
 
 use crate::{
     reference::{array, cases, max_difference, quantile, rows},

@@ -1,4 +1,5 @@
-//! Reads the recordings of the *reference*, the challenge's own simulator (`tests/reference/`), and compares lists of numbers.
+//! Reads the recordings of the *reference*, the simulator of the 2023 Robot Air Hockey Challenge (`tests/reference/`), and compares lists
+//! of numbers.
 
 use serde_json::Value;
 use std::{fs::File, io::Read, path::Path};

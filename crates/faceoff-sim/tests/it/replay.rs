@@ -1,6 +1,6 @@
-//! Repeats in the simulator what recordings of the *reference* (the challenge's own simulator) contain: bounces, impacts and whole
-//! episodes. The tests and `examples/fidelity.rs` compare the results. `docs/simulator.md` ("Compared with recordings") lists the
-//! recordings. States of the puck are [x, y, yaw, vx, vy, yaw rate] in the table frame, in SI units.
+//! Repeats in the simulator what recordings of the *reference* (the simulator of the 2023 Robot Air Hockey Challenge) contain: bounces,
+//! impacts and whole episodes. The tests and `examples/fidelity.rs` compare the results. `docs/simulator.md` ("Compared with recordings")
+//! lists the recordings. States of the puck are [x, y, yaw, vx, vy, yaw rate] in the table frame, in SI units.
 
 use crate::reference::{array, cases, flat, max_difference, recording, rows};
 use faceoff_sim::AirHockeyTask;
@@ -44,7 +44,7 @@ pub fn speed(state: &[f64; 6]) -> f64 {
 
 /// A bounce off a rim, a wall of the table (recording `rim_bounce`), as recorded and as simulated.
 pub struct Bounce {
-    /// Name of the group of bounces, e.g. `corner`.
+    /// Name of the series of bounces, e.g. `corner`.
     pub kind: String,
     /// States of the puck, one per ms.
     pub recorded: Vec<[f64; 6]>,
@@ -91,7 +91,7 @@ pub fn bounces() -> Vec<Bounce> {
 
 /// Differences between a recorded impact of a mallet on the puck (recording `mallet_impact`) and the simulated one, at the end.
 pub struct Impact {
-    /// Name of the group of impacts, e.g. `override_…`.
+    /// Name of the series of impacts, e.g. `override_…`.
     pub kind: String,
     /// Difference of the puck's velocity, divided by its recorded peak speed.
     pub velocity_error: f64,
@@ -149,9 +149,9 @@ pub struct Replay {
     /// Task and index of the episode, e.g. `hit 7`.
     pub name: String,
     /// First control step in which the recorded puck hit something.
-    pub first_impact_step: usize,
-    /// First control step in which robot 1's mallet may have touched the puck; `usize::MAX` if it never may have.
     pub first_contact_step: usize,
+    /// First control step in which robot 1's mallet may have touched the puck; `usize::MAX` if it never may have.
+    pub first_mallet_impact_step: usize,
     pub steps: Vec<StepDifferences>,
     /// The puck after each control step, as recorded.
     pub recorded_puck: Vec<[f64; 6]>,
@@ -219,15 +219,15 @@ fn replay_episode(task: AirHockeyTask, index: usize, case: &serde_json::Value) -
     );
     let mut replay = Replay {
         name: format!("{task} {index}"),
-        first_impact_step: first_sharp_change(&init, &puck),
-        first_contact_step: usize::MAX,
+        first_contact_step: first_sharp_change(&init, &puck),
+        first_mallet_impact_step: usize::MAX,
         steps: vec![],
         recorded_puck: puck.clone(),
         puck: vec![],
     };
     for step in 0..puck.len() {
         if may_touch(&episode.world().mallet(0), &episode.state().puck) {
-            replay.first_contact_step = replay.first_contact_step.min(step);
+            replay.first_mallet_impact_step = replay.first_mallet_impact_step.min(step);
         }
         let observation = max_difference(&flat(&case["obs"][step]), episode.observation());
         let outcome = episode.step(&flat(&case["action"][step]));

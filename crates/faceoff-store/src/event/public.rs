@@ -93,7 +93,7 @@ impl Event {
             | Self::EvaluationBegun
             | Self::EvaluationScoringStarted
             | Self::EvaluationApplied { .. }
-            | Self::AblationOrdered { .. }
+            | Self::AblationRequested { .. }
             | Self::AblationFinished
             | Self::AblationFailed { .. }
             | Self::ProposalMade { .. }

@@ -56,11 +56,11 @@ impl Store {
                     seed: SeedLabel::Ablation,
                     keeps_recordings: false,
                 };
-                let (job, team) = (purpose::ABLATION_SHARD, ablated.team);
-                runs::queue_run(tx, &run, &[submission], job, team).await?;
+                let job_template = purpose::ABLATION_SHARD;
+                runs::queue_run(tx, &run, &[submission], job_template, ablated.team).await?;
                 ablations::insert_run(tx, id, run.id).await?;
             }
-            let event = Event::AblationOrdered {
+            let event = Event::AblationRequested {
                 submission,
                 episodes_per_task: plan.episodes_per_task,
             };

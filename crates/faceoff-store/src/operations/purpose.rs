@@ -55,7 +55,9 @@ const fn lane(name: &'static str, urgency: u32, rank: u32) -> Lane {
     }
 }
 
-// The lanes, in three levels of urgency. Level 0: scoring, which runs no agent and ends an evaluation. Level 1: validation
+// Templates of jobs: what all jobs of one purpose have in common, that is, their kind and their lane.
+//
+// The lanes are in three levels of urgency. Level 0: scoring, which runs no agent and ends an evaluation. Level 1: validation
 // runs, shards and games of rounds share the slots equally, so that none delays the others for long. Level 2: ablations,
 // proposals and all other games, which do not count, get the remaining slots.
 pub(crate) const SCORING: NewJob = JobKind::Scoring.in_lane(lane("finalise", 0, 0));

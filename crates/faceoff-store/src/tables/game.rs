@@ -35,9 +35,10 @@ pub enum GamePurpose {
         /// The team that requested it; it counts towards this team's quota.
         asked_by: TeamId,
     },
-    /// A game of a replay: all games of all rounds are repeated, to measure how certain the winner is.
+    /// A game of a repetition of the schedule (a *replay* in the database and the API): all games of all rounds are played again with
+    /// other seeds, to measure how certain the winner is.
     ScheduleReplay {
-        /// Number of the replay, from 1.
+        /// Number of the repetition, from 1.
         replay: u32,
         /// The game that is repeated.
         original: ScheduleEntry,

@@ -1,4 +1,5 @@
-//! Recent durations of jobs: the slot time (time for which a worker's slot was occupied) that the queue has charged.
+//! Recent durations of jobs: their slot time, for which a slot of a worker was occupied (the column `charged_ms`). Of the
+//! evaluations only those that count on the boards are read (`counting_evaluations`), no trials and no proposed re-evaluations.
 
 use crate::{column::Instant, error::Result};
 use faceoff_types::{EvaluationId, RunId, StageDay, TeamId};

@@ -461,8 +461,11 @@ mod tests {
         let stage = stage(None);
         let next = |newest, now: &str| stage.next_cutoff(newest, time(now)).map(|(date, _)| date);
         assert_eq!(next(None, "2026-02-01T00:00:00Z"), Some(date(2026, 3, 2)));
-        let second = Some(date(2026, 3, 2));
-        assert_eq!(next(second, "2026-03-02T22:59:00Z"), Some(date(2026, 3, 3)));
+        let evaluated_day = Some(date(2026, 3, 2));
+        assert_eq!(
+            next(evaluated_day, "2026-03-02T22:59:00Z"),
+            Some(date(2026, 3, 3))
+        );
         assert_eq!(next(Some(date(2026, 3, 5)), "2026-03-05T09:00:00Z"), None);
     }
 }

@@ -144,7 +144,7 @@ async fn ablation_runs_last_and_reaches_no_board() {
     for _ in 0..SHARDS_PER_RUN {
         let (claim, run, shard) = f.claim_shard().await;
         assert_eq!(run.id, evaluation.run);
-        f.commit_shard(&claim, &shard, 0).await;
+        f.commit_shard(&claim, &shard).await;
     }
     f.claim_scoring().await;
     let (claim, _, shard) = f.claim_ablation_shard().await;

@@ -104,7 +104,7 @@ async fn recordings_are_deleted_a_day_after_the_evaluation() {
         .put_folder(&key, scratch.path())
         .await
         .unwrap();
-    f.commit_shard(&claim, &shard, 0).await;
+    f.commit_shard(&claim, &shard).await;
     assert_eq!(f.store.remove_old_recordings(f.now).await.unwrap(), 0);
     f.store
         .artifacts()

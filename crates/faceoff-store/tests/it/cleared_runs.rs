@@ -121,10 +121,10 @@ async fn cleared_run_keeps_agent_faults() {
     let mut f = TestStore::new().await;
     let evaluation = f.start_evaluation(&six_shard_plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
-    f.commit_shard(&claim, &shard, 0).await;
+    f.commit_shard(&claim, &shard).await;
     while !f.state(evaluation.id).await.is_over() {
         let (claim, _, shard) = f.claim_shard().await;
-        f.commit_shard(&claim, &shard, 1).await;
+        f.commit_shard_with_faults(&claim, &shard, 1).await;
     }
     let faults_before = f.store.run_faults(evaluation.run).await.unwrap();
     assert!(!faults_before.faults.is_empty());
@@ -153,7 +153,7 @@ async fn open_run_is_not_clearable() {
     let mut f = TestStore::new().await;
     let evaluation = f.start_evaluation(&six_shard_plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
-    f.commit_shard(&claim, &shard, 0).await;
+    f.commit_shard(&claim, &shard).await;
     f.advance_clock_s(30 * RECORDINGS_KEPT_FOR.as_secs());
     assert_eq!(clearable_runs(&f).await, []);
     assert_eq!(unsummarised_runs(&f).await, []);

@@ -54,10 +54,7 @@ async fn submission_reaches_board_after_upload_and_runs() {
             EPISODES_PER_SHARD * shards_done
         );
         f.advance_clock_s(1);
-        assert_eq!(
-            f.commit_shard(&claim, &shard, 0).await,
-            CommitOutcome::Stored
-        );
+        assert_eq!(f.commit_shard(&claim, &shard).await, CommitOutcome::Stored);
         played.push((shard.task, shard.first_episode, shard.end_episode));
     }
     // They are claimed in an order that is drawn.
@@ -158,7 +155,7 @@ async fn shards_are_claimed_in_an_order_drawn_for_each_run() {
     let mut order_by_run = std::collections::HashMap::<_, Vec<_>>::new();
     while let Some(ClaimedJob { claim, job }) = f.claim().await {
         if let Job::Shard { run, shard, .. } = job {
-            f.commit_shard(&claim, &shard, 0).await;
+            f.commit_shard(&claim, &shard).await;
             let order = order_by_run.entry(run.id).or_default();
             order.push((shard.task, shard.first_episode));
         }

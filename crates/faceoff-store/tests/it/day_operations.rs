@@ -106,7 +106,7 @@ async fn missed_day_runs_on_its_date_with_active_submissions() {
         [(missed_day, REASON.to_owned())]
     );
     let (claim, run, shard) = f.claim_shard().await;
-    f.commit_shard(&claim, &shard, 0).await;
+    f.commit_shard(&claim, &shard).await;
     assert_eq!(
         run.seed,
         SeedLabel::StageDay(missed_day),
@@ -197,7 +197,7 @@ async fn extra_evaluation_of_open_day_uses_its_episodes() {
         match job {
             Job::Shard { run, shard, .. } => {
                 labels.push(run.seed);
-                f.commit_shard(&claim, &shard, 0).await;
+                f.commit_shard(&claim, &shard).await;
             }
             _ => {
                 let released = f.store.days().await.unwrap()[0].0.released_at;
@@ -251,7 +251,7 @@ async fn extra_evaluation_of_released_day_gets_new_episodes() {
     assert_eq!(rerun.extra_for.as_deref(), Some(REASON));
     let (claim, run, shard) = f.claim_shard().await;
     assert_eq!(run.seed, SeedLabel::Extra(extra_evaluation.id));
-    f.commit_shard(&claim, &shard, 0).await;
+    f.commit_shard(&claim, &shard).await;
     f.run_all_with_score(3.0).await;
     let board = f.board().await;
     assert_eq!(

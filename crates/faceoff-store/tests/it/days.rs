@@ -222,7 +222,7 @@ async fn cancelled_evaluation_loses_leases_and_can_be_rerun() {
         .unwrap();
     assert!(!f.store.heartbeat(&claim, 1, LEASE_S, f.now).await.unwrap());
     assert_eq!(
-        f.commit_shard(&claim, &shard, 0).await,
+        f.commit_shard(&claim, &shard).await,
         CommitOutcome::LeaseLost
     );
     assert!(f.claim().await.is_none());

@@ -14,11 +14,11 @@ async fn configure_daily_stage(f: &TestStore, day_deadline: DayDeadline) -> Stag
         day_deadline,
         ..settings
     };
-    let configured = f
+    let change = f
         .store
         .configure_stage(rules, settings, IanaTimeZone::UTC, f.now)
         .await;
-    configured.unwrap();
+    change.unwrap();
     f.store.stages().await.unwrap()[0].id
 }
 
@@ -36,7 +36,7 @@ async fn run_shard(f: &TestStore) -> (String, TeamId) {
     else {
         panic!("a shard is queued")
     };
-    f.commit_shard(&claim, &shard, 0).await;
+    f.commit_shard(&claim, &shard).await;
     let RunOwner::Evaluation { id, .. } = owner else {
         panic!("expected a shard of an evaluation, claimed one of {owner:?}")
     };
@@ -59,7 +59,7 @@ async fn unfinished_day_runs_before_the_next_one() {
         panic!("a shard is queued")
     };
     f.advance_clock_s(24 * 3600);
-    f.commit_shard(&claim, &shard, 0).await;
+    f.commit_shard(&claim, &shard).await;
     let gamma = f.valid_submission_of("Gamma").await;
     assert_eq!(start_day(&f, stage).await.len(), 3);
 
@@ -77,7 +77,7 @@ async fn unfinished_day_runs_before_the_next_one() {
                 claim,
                 job: Job::Shard { owner, shard, .. },
             }) => {
-                f.commit_shard(&claim, &shard, 0).await;
+                f.commit_shard(&claim, &shard).await;
                 let RunOwner::Evaluation { id, .. } = owner else {
                     panic!("expected a shard of an evaluation, claimed one of {owner:?}")
                 };
@@ -134,7 +134,7 @@ async fn deadline_ends_open_evaluations_and_releases_the_day() {
                 if matches!(owner, RunOwner::Evaluation { id, .. } if id == id_of(alpha.team)) {
                     break (claim, shard);
                 }
-                f.commit_shard(&claim, &shard, 0).await;
+                f.commit_shard(&claim, &shard).await;
             }
             ClaimedJob {
                 claim,
@@ -171,7 +171,7 @@ async fn deadline_ends_open_evaluations_and_releases_the_day() {
         assert!(reason.contains(phrase), "{phrase} is not in {reason}");
     }
     assert_eq!(
-        f.commit_shard(&alpha_claim, &alpha_shard, 0).await,
+        f.commit_shard(&alpha_claim, &alpha_shard).await,
         CommitOutcome::LeaseLost
     );
     assert_eq!(

@@ -156,7 +156,7 @@ async fn filled_store() -> TestStore {
     f.advance_clock_s(24 * 3600);
     f.evaluate(submissions[0].id, &one_shard_plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
-    f.commit_shard(&claim, &shard, 0).await;
+    f.commit_shard(&claim, &shard).await;
     let cup = NewTournament {
         name: "Cup".parse().unwrap(),
         stage: None,
@@ -238,7 +238,7 @@ async fn earlier_schema_is_migrated_with_all_rows() {
         match job {
             Job::Shard { shard, .. } => {
                 shards += 1;
-                migrated.commit_shard(&claim, &shard, 0).await;
+                migrated.commit_shard(&claim, &shard).await;
             }
             Job::Scoring { .. } => {
                 scorings += 1;

@@ -23,7 +23,7 @@ async fn events_record_each_step_of_a_submission() {
     let submission = f.valid_submission_of("Alpha").await;
     let evaluation = f.evaluate(submission.id, &one_task).await;
     let (claim, _, shard) = f.claim_shard().await;
-    f.commit_shard(&claim, &shard, 0).await;
+    f.commit_shard(&claim, &shard).await;
     let (claim, ..) = f.claim_shard().await;
     f.store
         .release_failed(&claim, "disk full", f.now)
@@ -121,11 +121,11 @@ async fn events_record_each_end_of_an_evaluation() {
         let (claim, _, shard) = f.claim_shard().await;
         match end {
             End::Finished => {
-                f.commit_shard(&claim, &shard, 0).await;
+                f.commit_shard(&claim, &shard).await;
                 let (claim, _) = f.claim_scoring().await;
                 f.finish_scoring(&claim, 7.0, DATASET_KEY).await;
             }
-            End::AgentFailed => drop(f.commit_shard(&claim, &shard, 1).await),
+            End::AgentFailed => drop(f.commit_shard_with_faults(&claim, &shard, 1).await),
             End::Cancelled => {
                 let cancelled =
                     f.store
@@ -205,7 +205,7 @@ async fn signals_report_new_jobs_and_changes() {
     assert!(signal.has_changed().unwrap());
     signal.mark_unchanged();
     let (claim, ..) = f.claim_shard().await;
-    f.commit_shard(&claim, &shard, 0).await;
+    f.commit_shard(&claim, &shard).await;
     assert!(!signal.has_changed().unwrap(), "no new job to claim");
 
     let sent: Vec<_> = std::iter::from_fn(|| events.try_recv().ok()).collect();

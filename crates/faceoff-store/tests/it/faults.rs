@@ -12,7 +12,7 @@ async fn evaluation_at_fault_limit_is_scored() {
     // Faults of each of the six shards: three in all.
     for faults in [2, 1, 0, 0, 0, 0] {
         let (claim, _, shard) = f.claim_shard().await;
-        f.commit_shard(&claim, &shard, faults).await;
+        f.commit_shard_with_faults(&claim, &shard, faults).await;
     }
     assert_eq!(f.state(evaluation.id).await, EvaluationState::Scoring);
 }
@@ -25,9 +25,9 @@ async fn evaluation_above_fault_limit_ends_without_score() {
     let (running, _, running_shard) = f.claim_shard().await;
     let (third, _, third_shard) = f.claim_shard().await;
     // The third shard is committed before the first; the faults are listed in the order of the shards.
-    f.commit_shard(&third, &third_shard, 2).await;
+    f.commit_shard_with_faults(&third, &third_shard, 2).await;
     assert!(!f.state(evaluation.id).await.is_over());
-    f.commit_shard(&first, &first_shard, 2).await;
+    f.commit_shard_with_faults(&first, &first_shard, 2).await;
 
     assert_eq!(
         f.state(evaluation.id).await,
@@ -63,7 +63,7 @@ async fn evaluation_above_fault_limit_ends_without_score() {
             .unwrap()
     );
     assert_eq!(
-        f.commit_shard(&running, &running_shard, 0).await,
+        f.commit_shard(&running, &running_shard).await,
         CommitOutcome::LeaseLost
     );
     assert!(

@@ -164,7 +164,7 @@ impl TestStore {
             let ClaimedJob { claim, job } = self.claim().await.expect("a job is queued");
             match job {
                 Job::Shard { shard, .. } => {
-                    self.commit_shard(&claim, &shard, 0).await;
+                    self.commit_shard(&claim, &shard).await;
                 }
                 Job::Scoring { evaluation, .. } => {
                     self.finish_scoring(&claim, 1.0, DATASET_KEY).await;
@@ -182,7 +182,7 @@ impl TestStore {
         while let Some(ClaimedJob { claim, job }) = self.claim().await {
             match job {
                 Job::Shard { shard, .. } => {
-                    self.commit_shard(&claim, &shard, 0).await;
+                    self.commit_shard(&claim, &shard).await;
                 }
                 Job::Scoring { .. } => {
                     self.finish_scoring(&claim, score, DATASET_KEY).await;
@@ -268,8 +268,13 @@ impl TestStore {
             .unwrap()
     }
 
+    /// Commits a claimed shard without agent faults.
+    pub async fn commit_shard(&self, claim: &JobClaim, shard: &Shard) -> CommitOutcome {
+        self.commit_shard_with_faults(claim, shard, 0).await
+    }
+
     /// Commits a claimed shard, whose first `faults` episodes ended by an agent fault.
-    pub async fn commit_shard(
+    pub async fn commit_shard_with_faults(
         &self,
         claim: &JobClaim,
         shard: &Shard,

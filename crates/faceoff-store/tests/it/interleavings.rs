@@ -57,7 +57,7 @@ impl History {
         };
         match job {
             Job::Shard { shard, .. } => {
-                if f.commit_shard(&claim, &shard, 0).await == CommitOutcome::Stored {
+                if f.commit_shard(&claim, &shard).await == CommitOutcome::Stored {
                     *self.commits.entry(shard.id).or_default() += 1;
                 }
             }

@@ -618,7 +618,14 @@ async fn migration_creates_first_stage_with_revisions() {
     let store = Store::open(folder.path()).await.unwrap();
     let stage = store.stages().await.unwrap().remove(0);
     assert_eq!(stage.name.as_str(), "Qualifying");
-    assert_eq!((stage.names_seeds, stage.configured), (false, true));
+    assert!(
+        !stage.names_seeds,
+        "the seeds of its days derive from the dates alone, as before there were stages"
+    );
+    assert!(
+        stage.configured,
+        "its rules are those of the configuration file"
+    );
     let revisions = store.stage_revisions(stage.id).await.unwrap();
     let revisions: Vec<_> = revisions
         .iter()
@@ -641,8 +648,8 @@ async fn migration_creates_first_stage_with_revisions() {
     // The configuration of before, but with the ruleset of the new program, which is a new revision.
     let (rules, settings) = rules_and_settings(&six_shard_plan());
     let now = "2026-03-01T08:30:00Z".parse().unwrap();
-    let configured = store.configure_stage(rules.clone(), settings, IanaTimeZone::UTC, now);
-    configured.await.unwrap();
+    let change = store.configure_stage(rules.clone(), settings, IanaTimeZone::UTC, now);
+    change.await.unwrap();
     let stage = store.stages().await.unwrap().remove(0);
     assert_eq!((stage.rules.number, stage.rules.rules), (3, rules));
 }
@@ -728,10 +735,7 @@ async fn migration_keeps_leases_and_failure_counts() {
         "the key of the old program"
     );
     let shard = f.store.shards(run).await.unwrap().remove(1);
-    assert_eq!(
-        f.commit_shard(&claim, &shard, 0).await,
-        CommitOutcome::Stored
-    );
+    assert_eq!(f.commit_shard(&claim, &shard).await, CommitOutcome::Stored);
 
     let claim = JobClaim {
         job: id(1203),

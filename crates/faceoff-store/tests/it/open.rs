@@ -40,7 +40,7 @@ async fn reopened_store_has_all_data() {
     let submission = f.valid_submission_of("Alpha").await;
     let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
-    f.commit_shard(&claim, &shard, 1).await;
+    f.commit_shard_with_faults(&claim, &shard, 1).await;
     let (claim_before, ..) = f.claim_shard().await;
     let evaluation_before = f.store.evaluation(evaluation.id).await.unwrap();
     let season = f.store.season().await.unwrap();

@@ -101,7 +101,7 @@ async fn paused_queue_starts_no_job_and_loses_none() {
     assert_eq!((paused.at, paused.reason.as_str()), (f.now, REASON));
     assert!(f.claim().await.is_none());
     assert_eq!(
-        f.commit_shard(&claim, &shard, 0).await,
+        f.commit_shard(&claim, &shard).await,
         CommitOutcome::Stored,
         "running jobs continue"
     );

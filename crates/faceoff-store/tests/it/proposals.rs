@@ -65,7 +65,7 @@ async fn trial_runs_last_and_reaches_no_board() {
     for _ in 0..2 {
         let (claim, run, shard) = f.claim_shard().await;
         assert_eq!(run.seed, SeedLabel::StageDay(day.stage_day));
-        f.commit_shard(&claim, &shard, 0).await;
+        f.commit_shard(&claim, &shard).await;
         let (claim, _) = f.claim_scoring().await;
         f.finish_scoring(&claim, 1.0, DATASET_KEY).await;
     }
@@ -77,7 +77,7 @@ async fn trial_runs_last_and_reaches_no_board() {
             SeedLabel::Trial(trial.id),
             "the trial has its own episodes"
         );
-        f.commit_shard(&claim, &shard, 0).await;
+        f.commit_shard(&claim, &shard).await;
         let (claim, _) = f.claim_scoring().await;
         f.finish_scoring(&claim, score, "t").await;
     }
@@ -134,7 +134,7 @@ async fn impossible_trial_is_refused() {
     let (claim, _, shard) = f.claim_shard().await;
     discard(&f, proposed.id).await.unwrap();
     assert_eq!(
-        f.commit_shard(&claim, &shard, 0).await,
+        f.commit_shard(&claim, &shard).await,
         CommitOutcome::LeaseLost
     );
     assert!(f.claim().await.is_none());
@@ -159,7 +159,7 @@ async fn reevaluation_counts_only_once_applied() {
         match job {
             Job::Shard { run, shard, .. } => {
                 labels.push(run.seed);
-                f.commit_shard(&claim, &shard, 0).await;
+                f.commit_shard(&claim, &shard).await;
             }
             _ => {
                 f.finish_scoring(&claim, score, "again").await;
@@ -318,7 +318,7 @@ async fn reevaluation_by_new_rules_has_its_own_board() {
         (run.plan.max_faults, run.seed),
         (9, SeedLabel::StageDay(stage_day))
     );
-    f.commit_shard(&claim, &shard, 0).await;
+    f.commit_shard(&claim, &shard).await;
     f.run_all_with_score(5.0).await;
     apply(&f, proposed.id).await.unwrap();
     let scores = async |revision| -> Vec<f64> {

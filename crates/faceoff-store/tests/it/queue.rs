@@ -65,7 +65,7 @@ async fn expired_lease_is_reassigned_and_old_holder_refused() {
     );
     assert!(!f.store.heartbeat(&first, 1, LEASE_S, f.now).await.unwrap());
     assert_eq!(
-        f.commit_shard(&first, &shard, 0).await,
+        f.commit_shard(&first, &shard).await,
         CommitOutcome::LeaseLost
     );
     f.store.release(&first, f.now).await.unwrap();
@@ -81,11 +81,11 @@ async fn expired_lease_is_reassigned_and_old_holder_refused() {
         "the new lease is not affected"
     );
     assert_eq!(
-        f.commit_shard(&successor, &shard, 0).await,
+        f.commit_shard(&successor, &shard).await,
         CommitOutcome::Stored
     );
     assert_eq!(
-        f.commit_shard(&first, &shard, 0).await,
+        f.commit_shard(&first, &shard).await,
         CommitOutcome::LeaseLost
     );
 }
@@ -115,7 +115,7 @@ async fn job_filter_limits_claims() {
         let Job::Shard { shard, .. } = job else {
             panic!("expected a shard");
         };
-        f.commit_shard(&claim, &shard, 0).await;
+        f.commit_shard(&claim, &shard).await;
     }
     let scoring = claim(JobFilter::ValidationAndScoring).await.unwrap();
     assert!(
@@ -228,10 +228,7 @@ async fn late_commit_counts_without_a_new_lease() {
     f.start_evaluation(&six_shard_plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
     f.advance_clock_s(3600);
-    assert_eq!(
-        f.commit_shard(&claim, &shard, 0).await,
-        CommitOutcome::Stored
-    );
+    assert_eq!(f.commit_shard(&claim, &shard).await, CommitOutcome::Stored);
 }
 
 #[tokio::test]
@@ -239,10 +236,7 @@ async fn second_commit_changes_nothing() {
     let f = TestStore::new().await;
     let evaluation = f.start_evaluation(&six_shard_plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
-    assert_eq!(
-        f.commit_shard(&claim, &shard, 0).await,
-        CommitOutcome::Stored
-    );
+    assert_eq!(f.commit_shard(&claim, &shard).await, CommitOutcome::Stored);
     let mut different = shard_commit(&shard, 2);
     different.recording = Some("recordings/other".into());
     let repeated = f
@@ -294,7 +288,7 @@ async fn scoring_and_validation_precede_shards() {
         run.id, first.run,
         "evaluations are run in the order of their submissions"
     );
-    f.commit_shard(&claim, &shard, 0).await;
+    f.commit_shard(&claim, &shard).await;
     let team = f.create_team("Gamma").await;
     f.upload(&team).await;
     f.claim_scoring().await;
@@ -377,7 +371,7 @@ async fn failed_scoring_reruns_the_evaluation() {
     let one_shard = one_shard_plan();
     let evaluation = f.evaluate(submission.id, &one_shard).await;
     let (claim, _, shard) = f.claim_shard().await;
-    f.commit_shard(&claim, &shard, 0).await;
+    f.commit_shard(&claim, &shard).await;
     for _ in 0..MAX_ATTEMPTS {
         let (claim, _) = f.claim_scoring().await;
         f.store

@@ -24,7 +24,7 @@ async fn run_next_job(f: &mut TestStore) -> bool {
         }
         Job::Shard { shard, .. } => {
             f.advance_clock_s(10);
-            f.commit_shard(&claim, &shard, 0).await;
+            f.commit_shard(&claim, &shard).await;
         }
         Job::Scoring { .. } => {
             f.advance_clock_s(4);

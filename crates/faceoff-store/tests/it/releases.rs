@@ -85,7 +85,7 @@ async fn day_is_released_by_agent_failure_and_cancellation() {
     f.evaluate(failing.id, &strict).await;
     let cancelled = f.evaluate(cancelled.id, &strict).await.id;
     let (claim, _, shard) = f.claim_shard().await;
-    f.commit_shard(&claim, &shard, 1).await;
+    f.commit_shard_with_faults(&claim, &shard, 1).await;
     assert_eq!(released_at(&f).await, None);
     let result = f
         .store

@@ -25,7 +25,7 @@ async fn run_day(
     while let Some(ClaimedJob { claim, job }) = f.claim().await {
         match job {
             Job::Shard { shard, .. } => {
-                f.commit_shard(&claim, &shard, 0).await;
+                f.commit_shard(&claim, &shard).await;
             }
             Job::Scoring { evaluation, .. } => {
                 let submission = f.store.evaluation(evaluation).await.unwrap().submission;
@@ -321,7 +321,7 @@ async fn retention_keeps_datasets_of_blind_stage() {
     for score in [1.0, 2.0] {
         f.store.start_day(Actor::Host, stage, f.now).await.unwrap();
         let (claim, _, shard) = f.claim_shard().await;
-        f.commit_shard(&claim, &shard, 0).await;
+        f.commit_shard(&claim, &shard).await;
         let (claim, _) = f.claim_scoring().await;
         f.finish_scoring(&claim, score, DATASET_KEY).await;
         f.advance_clock_s(DAY_S);
@@ -595,7 +595,7 @@ async fn submission_of_unreleased_day_cannot_be_deleted() {
     f.evaluate(alpha.id, &one_shard_plan()).await;
     // One of the two evaluations is over, but the day is not.
     let (claim, _, shard) = f.claim_shard().await;
-    f.commit_shard(&claim, &shard, 0).await;
+    f.commit_shard(&claim, &shard).await;
     let (claim, finished) = f.claim_scoring().await;
     f.finish_scoring(&claim, 1.0, DATASET_KEY).await;
     let evaluated = f.store.evaluation(finished).await.unwrap().submission;
@@ -755,7 +755,7 @@ async fn storage_is_reported_without_reading_files() {
     // The size of a dataset is hidden from its team until the day is released.
     f.evaluate(alpha.id, &one_shard_plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
-    f.commit_shard(&claim, &shard, 0).await;
+    f.commit_shard(&claim, &shard).await;
     let (claim, evaluation) = f.claim_scoring().await;
     let owner = f.store.evaluation(evaluation).await.unwrap().team;
     store_file(&f, "datasets/today.zip", 77).await;

@@ -27,7 +27,7 @@ async fn run_evaluation(f: &TestStore, score: f64) -> Ruleset {
     for _ in 0..SHARDS {
         let (claim, run, shard) = f.claim_shard().await;
         rulesets.push(run.ruleset);
-        f.commit_shard(&claim, &shard, 0).await;
+        f.commit_shard(&claim, &shard).await;
     }
     let Some(ClaimedJob {
         claim,

@@ -255,7 +255,7 @@ async fn final_day_runs_once_between_close_and_sign_off() {
         secret.stage(stage.id).day(date),
         "the final day has its own seeds"
     );
-    f.commit_shard(&claimed.claim, &shard, 0).await;
+    f.commit_shard(&claimed.claim, &shard).await;
     f.run_all_with_score(40.0).await;
 
     let scores = async |days| -> Vec<f64> {

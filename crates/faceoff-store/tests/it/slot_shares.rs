@@ -550,7 +550,7 @@ async fn slot_time_charged_is_time_used() {
     assert_eq!(newly_charged_ms(&s).await, (50_000, 50_000));
     s.f.advance_clock_s(3);
     assert!(run.keeps_recordings);
-    s.f.commit_shard(&claim, &shard, 0).await;
+    s.f.commit_shard(&claim, &shard).await;
     assert_eq!(
         newly_charged_ms(&s).await,
         (38_000, 38_000),
@@ -559,7 +559,7 @@ async fn slot_time_charged_is_time_used() {
     // A commit after the lease expired is charged the time used, too.
     let (claim, _, shard) = s.f.claim_shard().await;
     s.f.advance_clock_s(100);
-    s.f.commit_shard(&claim, &shard, 0).await;
+    s.f.commit_shard(&claim, &shard).await;
     assert_eq!(newly_charged_ms(&s).await, (138_000, 100_000));
     // A cancelled job is charged until its cancellation.
     let (claim, _, _) = s.f.claim_shard().await;

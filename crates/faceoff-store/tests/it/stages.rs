@@ -67,7 +67,7 @@ async fn stages_have_their_own_days_seeds_and_boards() {
         assert_eq!(job_seeds.episodes, secret.stage(stage).day(date));
         assert_eq!(job_seeds.mismatch, secret.model_mismatch());
         seeds.push(job_seeds.episodes);
-        f.commit_shard(&claimed.claim, &shard, 0).await;
+        f.commit_shard(&claimed.claim, &shard).await;
         f.run_all_with_score(score).await;
         let board = f.store.board(stage, 1).await.unwrap();
         assert_eq!(board.len(), 1);
@@ -254,10 +254,10 @@ async fn first_stage_follows_configuration_until_changed() {
     let mut f = TestStore::new().await;
     let configure = async |f: &TestStore, plan: &RunPlan| {
         let (rules, settings) = rules_and_settings(plan);
-        let configured = f
+        let change = f
             .store
             .configure_stage(rules, settings, IanaTimeZone::UTC, f.now);
-        configured.await.unwrap();
+        change.await.unwrap();
         f.store.stages().await.unwrap()
     };
     let first = configure(&f, &six_shard_plan()).await;

@@ -33,6 +33,7 @@ async fn opened(
     (opened.unwrap(), teams)
 }
 
+/// A round as it was drawn. `byes` has the team without a game of each matchday, in their order.
 fn drawn(number: u32, matchdays: &[&[[TeamId; 2]]], byes: &[TeamId]) -> DrawnRound {
     let mut matchdays: Vec<_> = matchdays
         .iter()
@@ -576,7 +577,7 @@ async fn departure_cancels_open_games() {
 }
 
 #[tokio::test]
-async fn rerun_game_does_not_reopen_its_round() {
+async fn round_ends_after_rerun_of_a_game_of_an_earlier_round() {
     let f = TestStore::new().await;
     let rules = TournamentRules {
         withdrawals: Withdrawals::AtOnce,
@@ -878,7 +879,7 @@ async fn friendly_games_have_a_quota_and_wait_for_rounds() {
 }
 
 #[tokio::test]
-async fn schedule_replays_have_new_seeds_and_do_not_count() {
+async fn repeated_schedule_has_new_seeds_and_does_not_count() {
     let f = TestStore::new().await;
     let once = TournamentRules {
         format: TournamentFormat::RoundRobin { rounds: round(1) },

@@ -28,17 +28,17 @@ async fn ban_requeues_shards_of_open_runs() {
     // A worker with a similar name and the server's own slot are not affected.
     let (own, own_shard) = claim_for(&f, "slot-0").await;
     assert_eq!(
-        f.commit_shard(&own, &own_shard, 0).await,
+        f.commit_shard(&own, &own_shard).await,
         CommitOutcome::Stored
     );
     let (similar, similar_shard) = claim_for(&f, "remote/rack-10/slot-0").await;
     assert_eq!(
-        f.commit_shard(&similar, &similar_shard, 0).await,
+        f.commit_shard(&similar, &similar_shard).await,
         CommitOutcome::Stored
     );
     let (banned, banned_shard) = claim_for(&f, "remote/rack-1/slot-0").await;
     assert_eq!(
-        f.commit_shard(&banned, &banned_shard, 1).await,
+        f.commit_shard_with_faults(&banned, &banned_shard, 1).await,
         CommitOutcome::Stored
     );
     let (running, running_shard) = claim_for(&f, "remote/rack-1/slot-1").await;
@@ -56,7 +56,7 @@ async fn ban_requeues_shards_of_open_runs() {
 
     // The banned worker's late outcomes change nothing, and other workers run both shards again.
     assert_eq!(
-        f.commit_shard(&banned, &banned_shard, 0).await,
+        f.commit_shard(&banned, &banned_shard).await,
         CommitOutcome::LeaseLost
     );
     let mut remaining_shards = vec![banned_shard.id, running_shard.id];
@@ -65,7 +65,7 @@ async fn ban_requeues_shards_of_open_runs() {
             Job::Shard { shard, .. } => {
                 remaining_shards.retain(|id| *id != shard.id);
                 assert_eq!(
-                    f.commit_shard(&claimed.claim, &shard, 0).await,
+                    f.commit_shard(&claimed.claim, &shard).await,
                     CommitOutcome::Stored
                 );
             }
@@ -81,7 +81,7 @@ async fn ban_requeues_shards_of_open_runs() {
     }
     assert!(remaining_shards.is_empty(), "{remaining_shards:?}");
     assert_eq!(
-        f.commit_shard(&running, &running_shard, 0).await,
+        f.commit_shard(&running, &running_shard).await,
         CommitOutcome::LeaseLost
     );
     assert!(matches!(
@@ -131,13 +131,10 @@ async fn remote_leases_survive_a_server_restart() {
     assert!(claimed_jobs.contains(&unstarted.job) && claimed_jobs.contains(&own.job));
     assert!(!claimed_jobs.contains(&remote.job));
     assert_eq!(
-        f.commit_shard(&own, &own_shard, 0).await,
+        f.commit_shard(&own, &own_shard).await,
         CommitOutcome::LeaseLost
     );
-    assert_eq!(
-        f.commit_shard(&remote, &shard, 0).await,
-        CommitOutcome::Stored
-    );
+    assert_eq!(f.commit_shard(&remote, &shard).await, CommitOutcome::Stored);
     let is_leased_by = async |name: &str| {
         let worker = worker(name);
         f.store

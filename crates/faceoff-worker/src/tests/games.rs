@@ -206,7 +206,7 @@ async fn ended_attempts(server: &Server, game: GameId) -> u32 {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn only_the_counting_recording_of_a_game_is_kept() {
+async fn only_the_recording_of_the_last_result_is_kept() {
     let server = Server::new().await;
     let game = start_one_game(&server, faceoff_airhockey::competition().tournament_rules())
         .await

@@ -288,7 +288,7 @@ async fn missed_day_is_started_once() {
                     [
                         Event::EvaluationQueued { .. },
                         Event::DayStarted { evaluations: 1 },
-                        Event::AblationOrdered {
+                        Event::AblationRequested {
                             episodes_per_task: 2,
                             ..
                         },

@@ -64,7 +64,7 @@ impl BoardCommand {
     /// If the server cannot be reached, or has no such stage or division.
     pub fn run(self) -> anyhow::Result<()> {
         super::block_on(async {
-            let client = self.server.client_or_visitor()?;
+            let client = self.server.client_with_optional_token()?;
             let stage = match &self.stage {
                 Some(stage) => Some(find_stage(&client, stage).await?.id),
                 None => None,

@@ -41,7 +41,7 @@ impl EvaluationCommand {
         // Public evaluations need no token.
         super::block_on(async {
             show(
-                &self.server.client_or_visitor()?,
+                &self.server.client_with_optional_token()?,
                 self.server.json,
                 &self.args,
             )

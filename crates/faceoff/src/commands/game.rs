@@ -93,7 +93,7 @@ impl GameCommand {
     }
 
     async fn act(self) -> anyhow::Result<()> {
-        let client = self.server.client_or_visitor()?;
+        let client = self.server.client_with_optional_token()?;
         match self.action {
             Action::Test(tournament) => {
                 let id = tournament.find(&client).await?;

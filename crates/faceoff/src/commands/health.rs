@@ -26,7 +26,7 @@ impl HealthCommand {
         super::block_on(async {
             let health = self
                 .server
-                .client_or_visitor()?
+                .client_with_optional_token()?
                 .health()
                 .await
                 .map_err(as_unhealthy)?;

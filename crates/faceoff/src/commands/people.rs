@@ -49,7 +49,7 @@ fn invitation_line(invitation: &InvitationView) -> String {
         InvitedRole::Organiser => "organiser",
         InvitedRole::Member => "member",
         InvitedRole::Founder => "founder",
-        InvitedRole::Return => "return",
+        InvitedRole::PasswordReset => "return",
     };
     format!(
         "{}  {role:<10} {:<10} for {}, until {}",

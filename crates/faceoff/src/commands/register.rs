@@ -49,7 +49,7 @@ impl RegisterCommand {
         super::block_on(async {
             let created = self
                 .server
-                .client_or_visitor()?
+                .client_with_optional_token()?
                 .register(&registration)
                 .await?;
             print(self.server.json, &created, |created| {

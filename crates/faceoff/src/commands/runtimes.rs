@@ -20,7 +20,7 @@ impl RuntimesCommand {
     /// If the server cannot be reached.
     pub fn run(self) -> anyhow::Result<()> {
         super::block_on(async {
-            let offered = self.server.client_or_visitor()?.runtimes().await?;
+            let offered = self.server.client_with_optional_token()?.runtimes().await?;
             print(self.server.json, &offered, runtimes_text)
         })
     }
@@ -52,11 +52,12 @@ fn runtimes_text(offered: &RuntimesView) -> String {
         lines.push(format!("limits: {}", limits_text(&offered.limits)));
     }
     for (name, runtimes, limits) in contests {
-        lines.push(format!(
-            "{name} allows {}: {}",
-            super::output::lines_or(vec![runtimes.join(", ")], "none"),
-            limits_text(limits)
-        ));
+        let runtimes = if runtimes.is_empty() {
+            "none".to_owned()
+        } else {
+            runtimes.join(", ")
+        };
+        lines.push(format!("{name} allows {runtimes}: {}", limits_text(limits)));
     }
     lines.join("\n")
 }

@@ -22,7 +22,7 @@ impl SeasonCommand {
     /// If the server cannot be reached.
     pub fn run(self) -> anyhow::Result<()> {
         super::block_on(async {
-            let season = self.server.client_or_visitor()?.season().await?;
+            let season = self.server.client_with_optional_token()?.season().await?;
             print(self.server.json, &season, season_text)
         })
     }

@@ -137,7 +137,7 @@ impl ServerArgs {
     ///
     /// # Errors
     /// If the address is invalid.
-    pub fn client_or_visitor(&self) -> anyhow::Result<Client> {
+    pub fn client_with_optional_token(&self) -> anyhow::Result<Client> {
         self.connection()?.client()
     }
 

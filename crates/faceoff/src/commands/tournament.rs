@@ -36,7 +36,8 @@ enum Action {
     /// Show ratings of the submissions, by results and by goals, and head-to-head records
     Ratings(TournamentOrNewest),
     /// Show how often each team was champion in replays of the schedule with new seeds
-    Certainty(TournamentOrNewest),
+    #[command(name = "certainty")]
+    ChampionShares(TournamentOrNewest),
     /// Withdraw your team from a tournament permanently; without --confirm, only list the effects
     Withdraw {
         /// The tournament's name or id
@@ -59,7 +60,7 @@ impl TournamentCommand {
     }
 
     async fn act(self) -> anyhow::Result<()> {
-        let client = self.server.client_or_visitor()?;
+        let client = self.server.client_with_optional_token()?;
         match self.action {
             Action::List => {
                 let tournaments = client.tournaments().await?;
@@ -89,7 +90,7 @@ impl TournamentCommand {
                     table::ratings_text(&view.ratings, &view.head_to_head)
                 })
             }
-            Action::Certainty(tournament) => {
+            Action::ChampionShares(tournament) => {
                 let id = tournament.find(&client).await?;
                 let shares = client.champion_shares(id).await?;
                 print(self.server.json, &shares, text::champion_shares_text)

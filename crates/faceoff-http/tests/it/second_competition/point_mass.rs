@@ -1,7 +1,9 @@
 //! A competition of a mass on a line, which the agent accelerates. It has nothing of air hockey: two tasks, one kind of violation, no
 //! tiers, one layout of actions, and profiles with a constant wind.
 
-use faceoff_episode::{Conditions, Environment, InvalidConditions, Simulator, StateColumns, World};
+use faceoff_episode::{
+    Conditions, InvalidConditions, Simulator, StateColumns, World, WorldFactory,
+};
 use faceoff_types::*;
 use std::{any::Any, sync::Arc};
 
@@ -121,10 +123,10 @@ impl Simulator for PointMass {
         Ok(format!(r#"{{"step_s":{STEP_S}}}"#))
     }
 
-    fn environment(
+    fn world_factory(
         &self,
         conditions: &Conditions<'_>,
-    ) -> Result<Box<dyn Environment>, InvalidConditions> {
+    ) -> Result<Box<dyn WorldFactory>, InvalidConditions> {
         self.competition.find_profile(conditions.profile.as_str())?;
         let strength = conditions.perturbations.get("wind", "strength_m_s2");
         let strength_m_s2 = match strength {
@@ -156,7 +158,7 @@ struct Line {
     competition: Arc<Competition>,
 }
 
-impl Environment for Line {
+impl WorldFactory for Line {
     fn seed(&self, task: Task, index: u32) -> Seed {
         self.seed.episode(task, index)
     }

@@ -10,7 +10,7 @@ use reqwest::Method;
 use serde_json::{Value, json};
 
 /// How often each team becomes champion in the replays.
-async fn certainty(cup: &TestTournament) -> Value {
+async fn champion_shares(cup: &TestTournament) -> Value {
     cup.site
         .get(&format!("{}/certainty", cup.path), None)
         .await
@@ -21,7 +21,7 @@ async fn certainty(cup: &TestTournament) -> Value {
 async fn repeated_schedules_give_the_champion_probabilities() {
     let rules = json!({ "format": { "kind": "round_robin", "rounds": 1 } });
     let cup = TestTournament::open(&["A", "B", "C"], json!({ "rules": rules })).await;
-    let without_replays = certainty(&cup).await;
+    let without_replays = champion_shares(&cup).await;
     assert_eq!(
         (&without_replays["replays"], &without_replays["champions"]),
         (&json!(0), &json!([]))
@@ -54,7 +54,7 @@ async fn repeated_schedules_give_the_champion_probabilities() {
     for _ in 0..12 {
         cup.play_next(outcome).await.unwrap();
     }
-    let partial = certainty(&cup).await;
+    let partial = champion_shares(&cup).await;
     assert_eq!(
         (&partial["complete"], &partial["games_played"]),
         (&json!(4), &json!(12))
@@ -70,7 +70,7 @@ async fn repeated_schedules_give_the_champion_probabilities() {
         (&json!(1), &json!(12))
     );
     assert!(cup.claim().await.is_none());
-    let final_view = certainty(&cup).await;
+    let final_view = champion_shares(&cup).await;
     let shares: Vec<(String, &Value)> = final_view["champions"]
         .as_array()
         .unwrap()

@@ -16,7 +16,10 @@ impl ClockDecision {
         Ok(DecisionPreview {
             title: "Accept the system clock".to_owned(),
             button: "Accept the clock",
-            ..DecisionPreview::confirmed(clock::preview_accepted_step(app)?, ATTENTION_PATH)
+            ..DecisionPreview::needing_confirmation(
+                clock::preview_accepted_step(app)?,
+                ATTENTION_PATH,
+            )
         })
     }
 

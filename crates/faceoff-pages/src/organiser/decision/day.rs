@@ -27,7 +27,7 @@ impl DayDecision {
                     title: format!("Void the evaluation day {}", day.date),
                     reason_readers: Some(PUBLIC_REASON),
                     button: "Void the day",
-                    ..DecisionPreview::confirmed(effects, day_page(day))
+                    ..DecisionPreview::needing_confirmation(effects, day_page(day))
                 })
             }
             Self::Missed(day) => {

@@ -46,7 +46,7 @@ impl EvaluationDecision {
                     title: format!("Void the evaluation of {} by {}", view.day, view.team_name),
                     reason_readers: Some(PUBLIC_REASON),
                     button: "Void the evaluation",
-                    ..DecisionPreview::confirmed(effects, day_page(day_of(&view)))
+                    ..DecisionPreview::needing_confirmation(effects, day_page(day_of(&view)))
                 })
             }
             Self::Cancel(id) => {

@@ -25,7 +25,7 @@ impl GameDecision {
                     title: format!("Void the result of {}", effects.name),
                     reason_readers: Some(PUBLIC_REASON),
                     button: "Void the result",
-                    ..DecisionPreview::confirmed(effects, return_path)
+                    ..DecisionPreview::needing_confirmation(effects, return_path)
                 })
             }
             Self::Rerun(id) => {

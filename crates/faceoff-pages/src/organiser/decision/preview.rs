@@ -1,6 +1,6 @@
 //! The preview of a decision: what it will do, before an organiser confirms it.
 
-use crate::figures;
+use crate::format;
 use faceoff_service::services::decisions::Preview;
 use faceoff_types::StageDay;
 
@@ -33,8 +33,8 @@ impl DecisionPreview {
         }
     }
 
-    /// A decision with these effects, which the name of its subject confirms.
-    pub(super) fn confirmed(effects: Preview, return_path: impl Into<String>) -> Self {
+    /// A decision with these effects, which the organiser must confirm with the name of its subject.
+    pub(super) fn needing_confirmation(effects: Preview, return_path: impl Into<String>) -> Self {
         Self {
             effects: sentence(&effects),
             confirm_name: Some(effects.name),
@@ -71,5 +71,5 @@ pub(super) fn day_page(day: StageDay) -> String {
 
 /// The effects as sentences.
 pub(super) fn sentence(effects: &Preview) -> String {
-    figures::sentence(&effects.effect)
+    format::sentence(&effects.effect)
 }

@@ -1,7 +1,7 @@
 //! Decisions about the queue of jobs: pause it or resume it.
 
 use super::preview::{DecisionPreview, Done, PUBLIC_REASON};
-use crate::figures::utc_minute;
+use crate::format::utc_minute;
 use faceoff_api::requests;
 use faceoff_service::{
     app::AppState, problem::Problem, services::organiser_decisions, views::decision,

@@ -57,7 +57,7 @@ impl StageDecision {
                 DecisionPreview {
                     title: format!("Sign off {name}"),
                     button: "Sign off the stage",
-                    ..DecisionPreview::confirmed(effects, self.return_path())
+                    ..DecisionPreview::needing_confirmation(effects, self.return_path())
                 }
             }
         })

@@ -30,7 +30,7 @@ impl TeamDecision {
                     title: format!("Disqualify {}", effects.name),
                     reason_readers: Some(PUBLIC_REASON),
                     button: "Disqualify the team",
-                    ..DecisionPreview::confirmed(effects, TEAMS_PATH)
+                    ..DecisionPreview::needing_confirmation(effects, TEAMS_PATH)
                 })
             }
             Self::Reinstate(id) => {

@@ -95,7 +95,7 @@ impl TournamentDecision {
             Self::Close(_) => DecisionPreview {
                 title: format!("Close {name}"),
                 button: "Close the tournament",
-                ..DecisionPreview::confirmed(
+                ..DecisionPreview::needing_confirmation(
                     tournaments::preview_close(app, id).await?,
                     return_path,
                 )
@@ -111,7 +111,7 @@ impl TournamentDecision {
                     title: format!("{verb} {} from {name}", effects.name),
                     reason_readers: Some(PUBLIC_REASON),
                     button,
-                    ..DecisionPreview::confirmed(effects, return_path)
+                    ..DecisionPreview::needing_confirmation(effects, return_path)
                 }
             }
         })

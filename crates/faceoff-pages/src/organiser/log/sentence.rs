@@ -169,7 +169,7 @@ fn about_evaluations(words: &EventText<'_>, names: &Names) -> Option<String> {
         "evaluation_finalising" => format!("started to score {subject}"),
         "evaluation_finished" => {
             let score = words.event.details.get("score").and_then(Value::as_f64);
-            let score = score.map(crate::figures::one_decimal).unwrap_or_default();
+            let score = score.map(crate::format::one_decimal).unwrap_or_default();
             format!("finished {subject} with {score} %")
         }
         "evaluation_agent_failed" => format!("stopped {subject} after agent faults"),

@@ -1,4 +1,4 @@
-"""Gymnasium environments of the three qualifying tasks.
+"""Gymnasium environments of the three tasks: hit, defend and prepare.
 
 Importing this module registers ``faceoff/AirHockey-Hit-v0``, ``faceoff/AirHockey-Defend-v0`` and
 ``faceoff/AirHockey-Prepare-v0``::

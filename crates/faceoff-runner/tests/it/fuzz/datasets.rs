@@ -57,13 +57,14 @@ fn record_dataset(dir: &Path) {
     let shard = dir.join("shard");
     let folder = ShardFolder::create(&shard).unwrap();
     let mut recorder = Recorder::create(&folder, spec.task, simulator().competition()).unwrap();
-    let environment = simulator().environment(&shard_conditions(&spec)).unwrap();
-    let environment = environment.as_ref();
+    let world_factory = simulator().world_factory(&shard_conditions(&spec)).unwrap();
+    let world_factory = world_factory.as_ref();
     let mut outcomes = Vec::new();
     for episode in spec.episodes.clone() {
         let layout = Some(Interpolation::Linear.into());
         let mut running =
-            RunningEpisode::begin(environment, spec.task, episode, layout, &mut recorder).unwrap();
+            RunningEpisode::begin(world_factory, spec.task, episode, layout, &mut recorder)
+                .unwrap();
         let outcome = loop {
             let question = running.question().unwrap();
             if question.step == 30 {

@@ -1,4 +1,5 @@
-//! Replays: all games of a tournament are played again with new seeds, to show how certain its winner is.
+//! Repetitions of a tournament's schedule, called *replays* in the API and the database: all games are played again with new
+//! seeds, to show how certain the winner is.
 
 use crate::{
     boxed,
@@ -17,10 +18,10 @@ use faceoff_types::{GameId, GameSeedLabel, RoundNumber, TeamId, TournamentId};
 use jiff::Timestamp;
 use std::collections::BTreeMap;
 
-/// Maximum number of replays of a schedule.
+/// Maximum number of repetitions of a schedule.
 pub const MAX_SCHEDULE_REPLAYS: u32 = 1000;
 
-/// Maximum number of games in all replays of a tournament: they are queued at once, and read at once.
+/// Maximum number of games in all repetitions of a tournament's schedule: they are queued at once, and read at once.
 pub const MAX_REPLAYED_GAMES: u32 = 10_000;
 
 /// The games that count: they have a result, and neither team had left the tournament by their round.

@@ -30,7 +30,7 @@ impl DownloadArgs {
 
     async fn download(self) -> anyhow::Result<()> {
         // Public datasets need no token.
-        let client = self.server.client_or_visitor()?;
+        let client = self.server.client_with_optional_token()?;
         let id = self.evaluation.find(&client).await?;
         let file = self
             .out

@@ -13,6 +13,7 @@ pub(super) struct PlayOptions {
     /// The second side's agent; it may be the same bundle
     pub(super) bundle_b: PathBuf,
     /// Control steps per game; 50 steps are one second
+    // A window is a stretch of 500 control steps, in which each kind of violation counts at most once.
     #[arg(long, value_name = "N", default_value_t = GAME_WINDOWS * WINDOW_STEPS, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_GAME_STEPS)))]
     pub(super) steps: u32,
     /// Number of mirrored pairs, two games on one seed with swapped sides; recordings go to pair-K/half-1 and

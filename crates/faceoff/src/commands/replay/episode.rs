@@ -22,11 +22,11 @@ pub fn draw(dataset: &Path, task: Task, episode: u32, output: &Output) -> anyhow
             video.write(&scene, scene.whole(), &output.file)?;
         }
     }
-    let losses = recording.losses();
+    let penalties = recording.penalties();
     let summary = json!({
         "episode": recording.headline(),
         "why": recording.end_reason,
-        "losses": losses,
+        "losses": penalties,
         "file": output.file,
     });
     print(output.json, &summary, |_| {
@@ -34,7 +34,7 @@ pub fn draw(dataset: &Path, task: Task, episode: u32, output: &Output) -> anyhow
         let file = output.file.display().to_string();
         let lines: Vec<String> = head
             .into_iter()
-            .chain(losses.clone())
+            .chain(penalties.clone())
             .chain([file])
             .collect();
         lines.join("\n")
@@ -60,9 +60,9 @@ fn scene(recording: &EpisodeRecording) -> Scene {
     );
     let last = samples.len().saturating_sub(1);
     Scene {
-        ground: target_zone(outcome.task),
+        underlay: target_zone(outcome.task),
         captions: vec![(0, title), (last, recording.headline())],
-        starts: vec![0],
+        rally_starts: vec![0],
         clock: |step| format!("{:.2} s", time_s(step)),
         samples,
     }

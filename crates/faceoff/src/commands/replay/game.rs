@@ -87,9 +87,9 @@ fn scene(game: &RecordedGame) -> Scene {
     });
     let rallies = game.course.rallies.iter();
     Scene {
-        ground: String::new(),
+        underlay: String::new(),
         captions,
-        starts: rallies
+        rally_starts: rallies
             .map(|rally| page::first_sample(rally) as usize)
             .collect(),
         clock: |step| clock::text(u32::try_from(step).unwrap_or(u32::MAX)),

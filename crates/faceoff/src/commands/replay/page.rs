@@ -21,7 +21,7 @@ struct Page<'a> {
     recording: &'a EpisodeRecording,
     headline: String,
     /// Causes of penalty points.
-    losses: Vec<String>,
+    penalties: Vec<String>,
     duration_s: String,
     /// The table from above, as SVG.
     table: String,
@@ -45,7 +45,7 @@ pub fn html(recording: &EpisodeRecording) -> anyhow::Result<String> {
     let page = Page {
         recording,
         headline: recording.headline(),
-        losses: recording.losses(),
+        penalties: recording.penalties(),
         duration_s: format!("{:.2}", time_s(recording.puck.len() - 1)),
         table: table_view::svg(recording, WIDTH_PX, "id=\"table\""),
         plots: plots::draw(recording, WIDTH_PX)?,

@@ -88,13 +88,13 @@ fn charts(recording: &EpisodeRecording) -> Vec<Chart> {
         bounds: Vec::new(),
         max_range: f64::MIN..f64::MAX,
     };
-    // `group` is an index of `CONSTRAINTS`; `scale` converts its unit to the chart's.
-    let constraint_line = |group: usize, scale: f64| {
+    // `constraint` is an index of `CONSTRAINTS`; `scale` converts its unit to the chart's.
+    let constraint_line = |constraint: usize, scale: f64| {
         let values = recording
             .constraints
             .iter()
-            .map(move |values| scale * values[group]);
-        Line::after_steps(CONSTRAINTS[group].0, values)
+            .map(move |values| scale * values[constraint]);
+        Line::after_steps(CONSTRAINTS[constraint].0, values)
     };
     vec![
         puck_chart(0, "x"),

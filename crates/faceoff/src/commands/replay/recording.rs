@@ -159,15 +159,15 @@ impl EpisodeRecording {
         format!("{task}, episode {episode} of {}: {verdict}", self.agent)
     }
 
-    /// Causes of penalty points, one line each.
-    pub fn losses(&self) -> Vec<String> {
-        let mut losses = Vec::new();
-        for (group, (name, points, unit)) in CONSTRAINTS.iter().enumerate() {
-            let values = || self.constraints.iter().map(|values| values[group]);
-            if let Some(first) = self.first_violation(group) {
+    /// The penalty points with their causes, one line each.
+    pub fn penalties(&self) -> Vec<String> {
+        let mut penalties = Vec::new();
+        for (constraint, (name, points, unit)) in CONSTRAINTS.iter().enumerate() {
+            let values = || self.constraints.iter().map(|values| values[constraint]);
+            if let Some(first) = self.first_violation(constraint) {
                 let steps = values().filter(|value| *value > 0.0).count();
                 let worst = values().fold(f64::MIN, f64::max);
-                losses.push(format!(
+                penalties.push(format!(
                     "{points} points: {name} limit violated from step {first} ({:.2} s), in {steps} steps, by up to \
                     {worst:.4} {unit}",
                     time_s(first)
@@ -177,12 +177,12 @@ impl EpisodeRecording {
         let time = &self.outcome.computation_time;
         if let Some(fault) = &self.outcome.fault {
             let fault = fault.to_string();
-            losses.push(format!(
+            penalties.push(format!(
                 "{COMPUTATION_TIME_MAX_POINTS} points: agent fault: {}",
                 escape_unprintable(&fault)
             ));
         } else if computation_time_penalty(time) > 0.0 {
-            losses.push(format!(
+            penalties.push(format!(
                 "{} points: computation time up to {:.1} ms and {:.1} ms on average, where up to {:.0} ms cost nothing",
                 computation_time_penalty(time),
                 1e3 * time.max_s,
@@ -190,15 +190,15 @@ impl EpisodeRecording {
                 1e3 * COMPUTATION_TIME_LIMITS_S[0]
             ));
         }
-        losses
+        penalties
     }
 
     /// Step of the first violation of a constraint, from 1.
-    pub fn first_violation(&self, group: usize) -> Option<usize> {
+    pub fn first_violation(&self, constraint: usize) -> Option<usize> {
         let index = self
             .constraints
             .iter()
-            .position(|values| values[group] > 0.0);
+            .position(|values| values[constraint] > 0.0);
         index.map(|index| index + 1)
     }
 }

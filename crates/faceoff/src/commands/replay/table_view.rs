@@ -30,9 +30,9 @@ pub fn svg(recording: &EpisodeRecording, width_px: u32, attributes: &str) -> Str
     for [x, y] in &recording.observed_puck {
         out += &format!("<circle cx=\"{x:.4}\" cy=\"{y:.4}\" r=\"0.003\" fill=\"#888\"/>\n");
     }
-    for (group, (name, ..)) in CONSTRAINTS.iter().enumerate() {
+    for (constraint, (name, ..)) in CONSTRAINTS.iter().enumerate() {
         if let Some([x, y]) = recording
-            .first_violation(group)
+            .first_violation(constraint)
             .and_then(|k| recording.mallet.get(k))
         {
             out += &format!(

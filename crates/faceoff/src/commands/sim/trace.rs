@@ -6,7 +6,7 @@ use faceoff_sim::{
     ConstraintValues, Interpolation, JOINTS, MalletState, PerturbationSettings, Plant, SUBSTEPS,
     World,
     episode::{opponent::Opponent, task},
-    perturbation::table_factors::TableFactors,
+    perturbation::table_perturbations::TablePerturbations,
 };
 use faceoff_types::EpisodeEnd;
 use serde::Serialize;
@@ -63,7 +63,7 @@ fn trace(scenario: &Scenario, out: &mut impl Write) -> Result<()> {
     let factors = scenario.profile.factors();
     let plant = Plant::for_factors(factors, &settings, scenario.seed.model_mismatch());
     let mut world = World::new(&plant, &scenario.joints, scenario.puck);
-    let mut table = TableFactors::new(factors, &settings, &scenario.seed, &mut world);
+    let mut table = TablePerturbations::new(factors, &settings, &scenario.seed, &mut world);
     let mut opponent = (scenario.task == Some(faceoff_sim::AirHockeyTask::Hit)).then(Opponent::new);
     let mut steps = 0;
     let mut end = None;

@@ -31,13 +31,13 @@ pub struct Scene {
     /// After 0, 1, 2 … control steps; never empty.
     pub samples: Vec<Sample>,
     /// The samples at which a rally begins, and with it the trail of the puck.
-    pub starts: Vec<usize>,
+    pub rally_starts: Vec<usize>,
     /// Captions, each with the first sample that has it, in order.
     pub captions: Vec<(usize, String)>,
     /// The time after a number of control steps, as text.
     pub clock: fn(usize) -> String,
     /// SVG elements on the table, below the bodies.
-    pub ground: String,
+    pub underlay: String,
 }
 
 /// The colours of a video.
@@ -73,7 +73,7 @@ impl Scene {
         let height = (f64::from(CAPTION_PX) + height_px(WIDTH_PX)) as u32;
         let mut drawing = Drawing::new(WIDTH_PX, height.next_multiple_of(2), GROUND);
         drawing.elements(&table_parts::begin(WIDTH_PX, &place()));
-        drawing.elements(&self.ground);
+        drawing.elements(&self.underlay);
         drawing.elements(table_parts::END);
         Picture::draw(&drawing)
     }
@@ -104,7 +104,7 @@ impl Scene {
         let Some(bodies) = self.samples.get(sample) else {
             return String::new();
         };
-        let start = self.starts.iter().rfind(|start| **start <= sample);
+        let start = self.rally_starts.iter().rfind(|start| **start <= sample);
         let start = sample
             .saturating_sub(TRAIL_SAMPLES)
             .max(start.copied().unwrap_or_default());
@@ -150,10 +150,10 @@ mod tests {
     fn caption_changes_at_its_sample() {
         let scene = Scene {
             samples: Vec::new(),
-            starts: Vec::new(),
+            rally_starts: Vec::new(),
             captions: vec![(0, "0 : 0".to_owned()), (7, "1 : 0".to_owned())],
             clock: |_| String::new(),
-            ground: String::new(),
+            underlay: String::new(),
         };
         assert_eq!(
             [0, 6, 7, 9].map(|sample| scene.caption(sample)),

@@ -1,4 +1,4 @@
-//! The factors (kinds of perturbations) that act on the table and on the tracking of the puck, and so on all robots alike.
+//! The perturbations that act on the table and on the tracking of the puck, and so on all robots alike.
 
 use super::{
     disturbance::Disturbance, rehearsal_table::RehearsalTable, tracking_loss::TrackingLoss,
@@ -12,16 +12,16 @@ use crate::{
 };
 use faceoff_types::Seed;
 
-/// The factors of one episode or rally, with their draws.
+/// The perturbations of the table in one episode or rally, with their draws.
 #[derive(Debug, Clone)]
-pub struct TableFactors {
+pub struct TablePerturbations {
     disturbance: Option<Disturbance>,
     tracking_loss: Option<TrackingLoss>,
     /// Force on the puck by the table's tilt, N.
     tilt_n: [f64; 2],
 }
 
-impl TableFactors {
+impl TablePerturbations {
     /// Draws from the seed of the episode or rally, and sets the puck's damping in the world. `settings` are the magnitudes.
     #[must_use]
     pub fn new(

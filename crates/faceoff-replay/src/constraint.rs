@@ -1,15 +1,15 @@
-//! The groups of constraints on a robot's motion, each of which has one kind of violation.
+//! The constraints on a robot's motion, each of which has one kind of violation.
 
 use faceoff_airhockey::{EE, JOINT_POS, JOINT_VEL, LINK};
 use faceoff_sim::ConstraintValues;
 use faceoff_types::ViolationName;
 use serde::{Deserialize, Serialize};
 
-/// A group of constraints.
+/// A constraint on the motion of a robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
-pub enum Group {
+pub enum Constraint {
     /// Position of the end effector, m.
     Ee,
     /// Height of elbow and wrist, m.
@@ -20,7 +20,7 @@ pub enum Group {
     JointVel,
 }
 
-impl Group {
+impl Constraint {
     pub const ALL: [Self; 4] = [Self::Ee, Self::Link, Self::JointPos, Self::JointVel];
 
     /// The name of its kind of violation.
@@ -34,7 +34,7 @@ impl Group {
         }
     }
 
-    /// The group's constraint value; above 0 it is violated.
+    /// The value of the constraint; above 0 it is violated.
     #[must_use]
     pub const fn value(self, values: &ConstraintValues) -> f64 {
         match self {

@@ -1,7 +1,7 @@
-//! Runs episodes of the agent in this process, without pipes and sandbox. Prints success, penalty points by
+//! Measures the agent: runs its episodes in this process, without pipes and sandbox. Prints success, penalty points by
 //! kind, and how close to its limits the arm came. For development only.
 //!
-//! `cargo run -p striker --example tune -- hit,defend,prepare 100 [profile] [seasons] [first seed]`
+//! `cargo run -p striker --example measure -- hit,defend,prepare 100 [profile] [seasons] [first seed]`
 //!
 //! Each season is another draw of the arm's model mismatch. With `TRACE=SEASON:EPISODE` (two numbers) the steps of
 //! that episode are printed, with `LIST=1` the episodes that failed or violated a constraint.
@@ -210,8 +210,9 @@ fn print_step(agent: &Agent, episode: &Episode, state: &EpisodeState) {
 }
 
 fn new_agent(task: AirHockeyTask) -> anyhow::Result<Agent> {
+    let (robots, robot_index) = (1, 0);
     Ok(Agent::new(
         serde_json::from_str(&format!("{:?}", task.name().as_str()))?,
-        &env(1, 0),
+        &env(robots, robot_index),
     ))
 }

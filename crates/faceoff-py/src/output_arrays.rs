@@ -1,4 +1,4 @@
-//! NumPy arrays as output rows.
+//! NumPy arrays into which a step writes its results.
 
 use crate::{
     errors::argument_error,
@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 /// Arrays with a row per world, allocated by the Python half: observations, final observations, rewards, terminated,
 /// truncated, facts, true states and next true states; see [`Outputs`].
 #[derive(FromPyObject)]
-pub struct Rows<'py>(
+pub struct OutputArrays<'py>(
     PyReadwriteArray2<'py, f32>,
     PyReadwriteArray2<'py, f32>,
     PyReadwriteArray1<'py, f64>,
@@ -22,7 +22,7 @@ pub struct Rows<'py>(
     PyReadwriteArray2<'py, f64>,
 );
 
-impl Rows<'_> {
+impl OutputArrays<'_> {
     /// The arrays as slices of `worlds` rows.
     ///
     /// # Errors
