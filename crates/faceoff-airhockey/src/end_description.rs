@@ -16,7 +16,7 @@ pub const SLOW_GOAL: &str = "no goal, since it was too slow";
 /// The beginning of descriptions of own goals.
 pub const OWN_GOAL: &str = "own goal";
 /// The beginning of descriptions of pucks that became too fast for the simulation.
-pub const LOST_PUCK: &str = "puck was lost";
+pub const PUCK_TOO_FAST: &str = "puck was lost";
 
 /// Describes in one sentence, without a full stop, how the episode ended and what would have been a success.
 ///
@@ -83,7 +83,7 @@ fn left_the_table(task: Task, x: f64, y: f64, speed: f64) -> String {
     let y_text = rounded(y);
     if speed > TASK_RULES.lost_speed_m_s {
         return format!(
-            "{LOST_PUCK}: its speed exceeded {} m/s",
+            "{PUCK_TOO_FAST}: its speed exceeded {} m/s",
             TASK_RULES.lost_speed_m_s
         );
     }

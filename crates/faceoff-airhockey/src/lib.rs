@@ -17,7 +17,7 @@ mod simulator;
 mod world;
 
 pub use columns::{action_space, recording_columns};
-pub use end_description::{LOST_PUCK, OWN_GOAL, SLOW_GOAL, describe_end};
+pub use end_description::{OWN_GOAL, PUCK_TOO_FAST, SLOW_GOAL, describe_end};
 pub use game_record::{
     Effect, GameSink, GameStepRow, RallyEnding, RallyReadiness, RallyRow, RallyStart, Response,
     SideFault, SideStep,

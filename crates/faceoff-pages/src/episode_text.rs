@@ -1,7 +1,7 @@
 //! Outcomes and violations of episodes as text. A *violation* is a control step or more in which the robot exceeds a safety limit.
 
 use faceoff_replay::{
-    Constraint, Contact, ContactWith, EpisodeLine, LOST_PUCK, OWN_GOAL, SLOW_GOAL,
+    Constraint, Contact, ContactWith, EpisodeLine, OWN_GOAL, PUCK_TOO_FAST, SLOW_GOAL,
     ViolationSummary,
     model::{PUCK, TABLE},
 };
@@ -78,7 +78,7 @@ pub(super) fn plain_end(summary: &EpisodeLine, contacts: &[Contact]) -> String {
         (_, "left_table", false) if summary.end_description.starts_with(OWN_GOAL) => {
             "Own goal: the puck went into the agent’s goal."
         }
-        (_, "left_table", false) if summary.end_description.starts_with(LOST_PUCK) => {
+        (_, "left_table", false) if summary.end_description.starts_with(PUCK_TOO_FAST) => {
             "Lost: the puck was too fast for the simulation."
         }
         (_, "left_table", false) => "Lost: the puck left the table.",

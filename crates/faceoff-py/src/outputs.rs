@@ -67,8 +67,8 @@ impl<'a> Outputs<'a> {
     /// Writes the row of a world that was reset or restored.
     pub fn write_start(&mut self, row: usize, world: &World) {
         self.write_observation(row, world);
-        self.write_state(row, world);
-        self.write_next_state(row, world);
+        self.write_state_after_step(row, world);
+        self.write_current_state(row, world);
         let values = world.episode.constraints();
         let constraints = [values.ee, values.link, values.joint_pos, values.joint_vel];
         write_facts(world, &constraints, &mut self.facts[row * FACTS..][..FACTS]);
@@ -94,14 +94,14 @@ impl<'a> Outputs<'a> {
     }
 
     /// Writes the state after the step.
-    pub fn write_state(&mut self, row: usize, world: &World) {
+    pub fn write_state_after_step(&mut self, row: usize, world: &World) {
         if !self.states.is_empty() {
             self.states[row * STATE_LEN..][..STATE_LEN].copy_from_slice(&world.state());
         }
     }
 
-    /// Writes the present state.
-    pub fn write_next_state(&mut self, row: usize, world: &World) {
+    /// Writes the current state: after the end of an episode, that of the next one if that begins in the same step.
+    pub fn write_current_state(&mut self, row: usize, world: &World) {
         if !self.next_states.is_empty() {
             self.next_states[row * STATE_LEN..][..STATE_LEN].copy_from_slice(&world.state());
         }

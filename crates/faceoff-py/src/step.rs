@@ -72,13 +72,13 @@ pub fn step(
         outputs.truncated[row] = world.end == Some(EpisodeEnd::HORIZON);
         let facts = &mut outputs.facts[row * FACTS..][..FACTS];
         write_facts(world, &result.constraints, facts);
-        outputs.write_state(row, world);
+        outputs.write_state_after_step(row, world);
         if world.end.is_some() && autoreset == Autoreset::SameStep {
             outputs.write_final_observation(row, world);
             world.start_next(setup);
         }
         outputs.write_observation(row, world);
-        outputs.write_next_state(row, world);
+        outputs.write_current_state(row, world);
     }
 }
 

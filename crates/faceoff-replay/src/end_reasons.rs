@@ -1,3 +1,3 @@
 //! Beginnings of the descriptions in [`crate::EpisodeLine::end_description`].
 
-pub use faceoff_airhockey::{LOST_PUCK, OWN_GOAL, SLOW_GOAL};
+pub use faceoff_airhockey::{OWN_GOAL, PUCK_TOO_FAST, SLOW_GOAL};

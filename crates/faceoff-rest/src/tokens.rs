@@ -84,7 +84,8 @@ pub(crate) async fn rotate_token(
     tokens::rotate_token(&app, &caller, id).await.map(Json)
 }
 
-/// Revokes a token, or ends a session. Unless it is your own, all that was made with it ends, too; `made` says otherwise.
+/// Revokes a token, or ends a session. Unless it is your own, the tokens, invitations and webhooks that were created with it
+/// end, too. `made` decides otherwise: `keep` or `end`.
 #[utoipa::path(
     delete, path = "/tokens/{id}", tag = "people", security(("team" = []), ("organiser" = [])),
     params(("id" = TokenId, Path), requests::RevocationQuery),

@@ -2,7 +2,7 @@
 //! byte.
 //!
 //! A write never blocks, so that all waiting time is measured. Bytes that do not fit into the agent's input
-//! buffer are kept and sent while the service waits for the answer.
+//! buffer are kept and sent while the evaluator waits for the answer.
 
 use memchr::memchr;
 use rustix::{

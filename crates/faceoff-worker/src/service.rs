@@ -297,7 +297,7 @@ async fn wait_for(
     }
 }
 
-/// Keeps the metric of stalled slots up to date; the server's health depends on it.
+/// Keeps the metric of stalled slots, whose threads are blocked although their agents have ended, up to date; the server's health depends on it.
 async fn report_stalled_slots(metrics: Metrics, stop: CancellationToken) {
     const INTERVAL: Duration = Duration::from_secs(1);
     loop {

@@ -101,6 +101,7 @@ fn draw_score(card: &mut Card, view: &GameView, score: Option<[u32; 2]>) {
     let width = middle - half - LEFT;
     let name = |colour| text_style(Weight::Semibold, 54.0, colour);
     card.text_at_end(home, &name("accent"), [middle - half, SCORE_LINE], width);
+    // The away side's colour is that of the tier “improvable”, without its meaning.
     card.text(away, &name("fair"), [middle + half, SCORE_LINE], width);
 }
 

@@ -153,6 +153,7 @@ fn drop_from_memory(path: &Path) {
     python(DROP, path);
 }
 
+/// Advice about the page cache, by `posix_fadvise`.
 #[test]
 fn advice_neither_loads_nor_drops_a_shared_file() {
     let subject = Subject::new("covert_channel", &["big"]).with_large_bundle();

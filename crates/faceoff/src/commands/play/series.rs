@@ -41,7 +41,7 @@ pub(super) fn play(
         agents: matchup.agents(),
         spec: matchup.spec(),
     };
-    let mut players = Games::new(matchup, Notes::beside(options.json));
+    let mut game_player = Games::new(matchup, Notes::beside(options.json));
     let mut games = Vec::new();
     let mut json = String::new();
     if !options.json {
@@ -69,7 +69,7 @@ pub(super) fn play(
                 swapped,
                 out: &out,
             };
-            let report = play_with_retries(|| players.play(&attempt, &bar), &folder)?;
+            let report = play_with_retries(|| game_player.play(&attempt, &bar), &folder)?;
             let score = &report.archives.score;
             Results::clear_in(&out)?.write(score)?;
             finished_steps += u64::from(options.steps);
