@@ -106,11 +106,7 @@ pub(super) fn sentence(detail: &str) -> String {
     if first_word.ends_with(':') {
         return format!("{detail}.");
     }
-    let mut letters = detail.chars();
-    let first = letters.next().into_iter().flat_map(char::to_uppercase);
-    let mut text: String = first.chain(letters).collect();
-    text.push('.');
-    text
+    format!("{}.", capitalised(detail))
 }
 
 /// A non-negative value with two significant digits.
@@ -243,7 +239,8 @@ pub(super) fn violation_headers(competition: &Competition) -> Vec<ViolationHeade
     competition.violations.iter().map(head).collect()
 }
 
-fn capitalised(text: &str) -> String {
+/// The text with a capital letter.
+pub(super) fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
     let first = letters.next().into_iter().flat_map(char::to_uppercase);
     first.chain(letters).collect()

@@ -134,9 +134,7 @@ impl Frame {
 
     /// The title, on cards that show a link, of pages that have no own one: the subject with a capital letter.
     pub(super) fn card_title(&self) -> String {
-        let mut letters = self.subject.as_deref().unwrap_or("competition").chars();
-        let first = letters.next().map(|first| first.to_uppercase());
-        first.into_iter().flatten().chain(letters).collect()
+        format::capitalised(self.subject.as_deref().unwrap_or("competition"))
     }
 
     /// Path and name of each navigation entry.

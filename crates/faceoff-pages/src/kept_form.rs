@@ -3,6 +3,7 @@
 //! pages only, never on the server or in an address, and secrets are not kept.
 
 use crate::{
+    format,
     frame::{Frame, PageProblem, ServerFault, render},
     page_auth::form_path,
 };
@@ -41,10 +42,7 @@ const PATH_FIELD: &str = "form";
 impl KeptField {
     /// The name as a label.
     pub(super) fn label(&self) -> String {
-        let words = self.name.replace('_', " ");
-        let mut letters = words.chars();
-        let first = letters.next().into_iter().flat_map(char::to_uppercase);
-        first.chain(letters).collect()
+        format::capitalised(&self.name.replace('_', " "))
     }
 
     /// Was it a hidden field? Ids, versions and the invitation of a user who returns are not typed.

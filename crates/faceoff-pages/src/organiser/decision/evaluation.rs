@@ -1,6 +1,7 @@
 //! Decisions about an evaluation: void, cancel or repeat it, or grant an extra one.
 
-use super::preview::{DecisionPreview, Done, PUBLIC_REASON, day_page, sentence};
+use super::preview::{DecisionPreview, Done, PUBLIC_REASON, day_page};
+use crate::format;
 use faceoff_api::{
     requests::{self, NewExtraEvaluation},
     views::evaluation::EvaluationView,
@@ -86,7 +87,9 @@ impl EvaluationDecision {
                 Ok(DecisionPreview {
                     title: format!("Give {name} an extra evaluation for {}", day.date),
                     effects: match &effects {
-                        Some(effects) => format!("{} {episodes}", sentence(effects)),
+                        Some(effects) => {
+                            format!("{} {episodes}", format::sentence(&effects.effect))
+                        }
                         None => format!(
                             "The active submission of {name} will be evaluated once more for {}. {episodes}",
                             day.date

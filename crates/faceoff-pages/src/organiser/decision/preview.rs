@@ -36,7 +36,7 @@ impl DecisionPreview {
     /// A decision with these effects, which the organiser must confirm with the name of its subject.
     pub(super) fn needing_confirmation(effects: Preview, return_path: impl Into<String>) -> Self {
         Self {
-            effects: sentence(&effects),
+            effects: format::sentence(&effects.effect),
             confirm_name: Some(effects.name),
             is_grave: true,
             ..Self::new(return_path)
@@ -67,9 +67,4 @@ pub(super) const PUBLIC_REASON: &str = "public";
 /// Path of the page of an evaluation day.
 pub(super) fn day_page(day: StageDay) -> String {
     format!("/organiser/day?stage={}&day={}", day.stage, day.date)
-}
-
-/// The effects as sentences.
-pub(super) fn sentence(effects: &Preview) -> String {
-    format::sentence(&effects.effect)
 }
