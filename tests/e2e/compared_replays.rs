@@ -1,10 +1,11 @@
 //! Two episodes with one set of controls in a real browser: beside each other, and on one table.
 
 use crate::{
-    CONFIG, Team,
+    Team,
     axe::{axe_script, faults},
     evaluation_path,
     replay::PREFERS_REDUCED_MOTION,
+    shared_folder::start_prepared,
     start_day,
 };
 use faceoff_tests::{
@@ -35,23 +36,24 @@ const FAIL_SECOND_REPLAY_ONCE: &str = "
 
 /// Starts a server and waits for the evaluations of two teams. Returns the server and the path of the page that compares them.
 pub fn compared_evaluations(scratch: &Path, agents: [&str; 2]) -> (Server, String) {
-    let server = Server::start(&scratch.join("data"), CONFIG);
-    let teams = ["Alpha", "Beta"].map(|name| Team::create(&server, name));
-    let submissions = [0, 1].map(|index: usize| {
-        let agent = repository().join("agents").join(agents[index]);
-        teams[index].submit(&server, &agent)
-    });
-    let day = start_day(&server);
-    let [left_page, right_page] = [0, 1].map(|index: usize| {
-        let path = evaluation_path(&day, &submissions[index]);
-        let finished = teams[index].wait_until_finished(&server, &path);
-        assert_eq!(finished["state"], "finished", "{finished}");
-        path.replace("/api/v1", "")
-    });
-    let right_id = right_page.rsplit('/').next();
-    let right_id = right_id.expect("the path ends with the id");
-    let comparison = format!("{left_page}/compare/{right_id}");
-    (server, comparison)
+    let name = format!("compared-{}-{}", agents[0], agents[1]);
+    start_prepared(&name, scratch, |server, _| {
+        let teams = ["Alpha", "Beta"].map(|name| Team::create(server, name));
+        let submissions = [0, 1].map(|index: usize| {
+            let agent = repository().join("agents").join(agents[index]);
+            teams[index].submit(server, &agent)
+        });
+        let day = start_day(server);
+        let [left_page, right_page] = [0, 1].map(|index: usize| {
+            let path = evaluation_path(&day, &submissions[index]);
+            let finished = teams[index].wait_until_finished(server, &path);
+            assert_eq!(finished["state"], "finished", "{finished}");
+            path.replace("/api/v1", "")
+        });
+        let right_id = right_page.rsplit('/').next();
+        let right_id = right_id.expect("the path ends with the id");
+        format!("{left_page}/compare/{right_id}")
+    })
 }
 
 /// Waits until both replays are loaded.

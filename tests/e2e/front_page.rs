@@ -1,6 +1,6 @@
 //! The front page in a real browser: what a visitor who has never heard of the competition sees, and what moves.
 
-use crate::{CONFIG, Team, evaluation_path, replay::PREFERS_REDUCED_MOTION, start_day};
+use crate::{evaluate_bundle, replay::PREFERS_REDUCED_MOTION, shared_folder::start_prepared};
 use faceoff_tests::{
     browser::{Browser, Page, View},
     bundle,
@@ -11,13 +11,10 @@ use std::path::Path;
 /// Starts a server and waits for a public evaluation of an agent that succeeds in most episodes, whatever the season's secret is.
 /// Returns the server and the path of the evaluation's page.
 fn evaluated_striker(scratch: &Path) -> (Server, String) {
-    let server = Server::start(&scratch.join("data"), CONFIG);
-    let team = Team::create(&server, "Alpha");
-    let submission = team.submit(&server, &bundle::example_agent("striker", scratch));
-    let path = evaluation_path(&start_day(&server), &submission);
-    let finished = team.wait_until_finished(&server, &path);
-    assert_eq!(finished["state"], "finished", "{finished}");
-    (server, path.replace("/api/v1", ""))
+    start_prepared("evaluated-striker", scratch, |server, scratch| {
+        let agent = bundle::example_agent("striker", scratch);
+        evaluate_bundle(server, &agent).replace("/api/v1", "")
+    })
 }
 
 /// JavaScript: does the drawing move?

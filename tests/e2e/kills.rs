@@ -2,7 +2,7 @@
 //! evaluation in *shards* (jobs of some episodes) and commits each shard's results to its database. The moments of the kills
 //! are drawn in advance and counted in entries of the server's log, so they are the same on quick and slow machines.
 
-use crate::{Team, without_times};
+use crate::{Team, shared_folder::copy_folder, without_times};
 use arrow_array::RecordBatch;
 use bytes::Bytes;
 use faceoff_tests::{bundle, server::Server};
@@ -50,19 +50,6 @@ pub(crate) fn draw(index: u64) -> f64 {
     x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     ((x ^ (x >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-}
-
-pub(crate) fn copy_folder(from: &Path, to: &Path) {
-    fs::create_dir_all(to).expect("a scratch folder can be made");
-    for entry in fs::read_dir(from).expect("a folder can be read") {
-        let entry = entry.expect("a folder can be read");
-        let (from, to) = (entry.path(), to.join(entry.file_name()));
-        if from.is_dir() {
-            copy_folder(&from, &to);
-        } else {
-            fs::copy(&from, &to).expect("a scratch file can be copied");
-        }
-    }
 }
 
 /// When a server process is killed.

@@ -44,6 +44,7 @@ mod replay_controls;
 mod replay_loading;
 mod retention;
 mod runtimes;
+mod shared_folder;
 mod slot_shares;
 mod soak;
 mod time_budgets;
@@ -161,6 +162,16 @@ fn evaluation_path(day: &Value, submission: &Value) -> String {
         "/api/v1/evaluations/{}",
         id.as_str().expect("an evaluation has an id")
     )
+}
+
+/// Evaluates the agent of a team on a new server. Returns the API path of the finished evaluation.
+fn evaluate_bundle(server: &Server, bundle: &Path) -> String {
+    let team = Team::create(server, "Alpha");
+    let submission = team.submit(server, bundle);
+    let path = team.evaluate(server, &submission);
+    let finished = team.wait_until_finished(server, &path);
+    assert_eq!(finished["state"], "finished", "{finished}");
+    path
 }
 
 /// Downloads the dataset of a finished evaluation.

@@ -1,6 +1,6 @@
 //! Commands of an ordinary user, who may not make control groups: their own agents run with the other layers of the sandbox.
 
-use crate::{kills::copy_folder, without_times};
+use crate::{shared_folder::copy_folder, without_times};
 use faceoff_tests::{bundle::pack, program, repository};
 use serde_json::Value;
 use std::{

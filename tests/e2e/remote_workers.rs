@@ -16,12 +16,15 @@ mod shutdown;
 
 use crate::{
     Team, dataset, entry, evaluation_path,
-    kills::{Archive, assert_same, copy_folder, wait_for_outcome},
+    kills::{Archive, assert_same, wait_for_outcome},
+    shared_folder::{copy_folder, shared_folder},
     start_day,
 };
 use faceoff_tests::{bundle, nats::Nats, relay::Relay, server::Server, worker::Worker};
 use serde_json::{Value, json};
 use std::{
+    fs,
+    io::Cursor,
     net::SocketAddr,
     path::{Path, PathBuf},
 };
@@ -120,18 +123,35 @@ impl ReferenceRun {
     }
 
     fn prepare_with(scratch: &Path, config: &str, episodes: usize) -> Self {
-        let [data_dir, local_data_dir] = ["data", "local"].map(|name| scratch.join(name));
-        let (evaluation, team) = queue_evaluation(&data_dir, scratch, config);
-        copy_folder(&data_dir, &local_data_dir);
-        let local_server = Server::start(&local_data_dir, config);
-        resume(&local_server);
-        let expected = wait_for_outcome(&local_server, &team, &evaluation);
-        local_server.kill();
+        let shared = shared_folder(&format!("reference-run-of-{episodes}"), |folder| {
+            let [data_dir, local_data_dir] = ["data", "local"].map(|name| folder.join(name));
+            let (evaluation, team) = queue_evaluation(&data_dir, folder, config);
+            copy_folder(&data_dir, &local_data_dir);
+            let local_server = Server::start(&local_data_dir, config);
+            resume(&local_server);
+            let (result, archive) = wait_for_outcome(&local_server, &team, &evaluation);
+            local_server.kill();
+            let run = json!({ "evaluation": evaluation, "token": team.token, "result": result });
+            fs::write(folder.join("run.json"), run.to_string()).expect("test data can be written");
+            fs::write(
+                folder.join("dataset.zip"),
+                archive.into_inner().into_inner(),
+            )
+            .expect("test data can be written");
+        });
+        let data_dir = scratch.join("data");
+        copy_folder(&shared.join("data"), &data_dir);
+        let read = |name| fs::read(shared.join(name)).expect("test data can be read");
+        let run: Value = serde_json::from_slice(&read("run.json")).expect("it is JSON");
+        let text = |name: &str| run[name].as_str().expect("it is a string").to_owned();
+        let archive = Archive::new(Cursor::new(read("dataset.zip"))).expect("a dataset is a zip");
         Self {
             data_dir,
-            evaluation,
-            team,
-            expected,
+            evaluation: text("evaluation"),
+            team: Team {
+                token: text("token"),
+            },
+            expected: (run["result"].clone(), archive),
             episodes,
         }
     }

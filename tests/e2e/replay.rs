@@ -1,7 +1,7 @@
 //! Replays of episodes in a real browser, compared with the server's *clips*. A clip is the recorded motion of an episode, in
 //! *samples* at equal intervals.
 
-use crate::{CONFIG, Team, evaluation_path, start_day};
+use crate::{evaluate_bundle, shared_folder::start_prepared};
 use faceoff_replay::Clip;
 use faceoff_tests::{
     browser::{Browser, Page, View},
@@ -14,13 +14,9 @@ use std::{io::Write, path::Path};
 /// Starts a server and waits for an evaluation whose results are public. Returns the server and the path of the evaluation's
 /// page.
 pub fn released_evaluation(scratch: &Path) -> (Server, String) {
-    let server = Server::start(&scratch.join("data"), CONFIG);
-    let team = Team::create(&server, "Alpha");
-    let submission = team.submit(&server, &repository().join("agents/hold"));
-    let path = evaluation_path(&start_day(&server), &submission);
-    let finished = team.wait_until_finished(&server, &path);
-    assert_eq!(finished["state"], "finished", "{finished}");
-    (server, path.replace("/api/v1", ""))
+    start_prepared("released-evaluation", scratch, |server, _| {
+        evaluate_bundle(server, &repository().join("agents/hold")).replace("/api/v1", "")
+    })
 }
 
 /// Moves the replay's slider to a sample, and waits until the sample is drawn.

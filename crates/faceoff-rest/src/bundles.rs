@@ -144,8 +144,8 @@ pub(crate) async fn delete_submission(
     let submission = app.store.check_deletable(id, now).await?;
     let name = &submission.bundle.file_name;
     let effect = format!(
-        "the bundle {name:?} of {} bytes, uploaded on {}, would be deleted for good and could not be evaluated again; its \
-         name, hash, log and results would stay",
+        "the bundle {name:?} of {} bytes, uploaded on {}, will be deleted for good and cannot be evaluated again; its \
+         name, hash, log and results stay",
         submission.bundle.bytes,
         submission.created_at.strftime("%Y-%m-%d at %H:%M UTC")
     );

@@ -156,8 +156,8 @@ pub(crate) async fn apply_proposal(
             .iter()
             .filter(|change| change.old.map(|old| old.rank) != change.new.map(|new| new.rank));
         let effect = format!(
-            "{} evaluations of {day} would replace those that they repeat; {} teams would have another row and {} another \
-             rank; the reason {:?} would be public",
+            "{} evaluations of {day} will replace those that they repeat; {} teams will have another row and {} another rank; \
+             the reason {:?} will be public",
             view.evaluations.len(),
             outcome.changes.len(),
             rank_changes.count(),
@@ -191,7 +191,7 @@ pub(crate) async fn drop_proposal(
     let view = proposal::find(&app, id).await?;
     if view.decided_at.is_none() {
         let effect = format!(
-            "{} evaluations would never count; unfinished ones would be cancelled, and their datasets removed",
+            "{} evaluations will never count; unfinished ones will be cancelled, and their datasets removed",
             view.evaluations.len()
         );
         Problem::check_confirmed(confirm.as_deref(), view.stage_name.as_str(), &effect)?;

@@ -138,8 +138,8 @@ pub(crate) async fn retire_team(
 ) -> Result<Json<TeamView>, Problem> {
     let team = teams::find_own(&app, &caller, id).await?;
     let effect = format!(
-        "{} could neither upload nor be evaluated from now on; evaluations whose cutoff has passed would continue, and its \
-         results stay",
+        "{} can neither upload nor be evaluated from now on; evaluations whose cutoff has passed continue, and its results \
+         stay",
         team.name
     );
     Problem::check_confirmed(confirm.as_deref(), team.name.as_str(), &effect)?;

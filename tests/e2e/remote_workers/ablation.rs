@@ -3,7 +3,7 @@
 //! recorded motion of an episode; only episodes whose outcome differs from that in the ideal simulator have one.
 
 use super::{local_config, resume, server_config, worker_config};
-use crate::{Team, commands::admin, kills::copy_folder};
+use crate::{Team, commands::admin, shared_folder::copy_folder};
 use bytes::Bytes;
 use faceoff_tests::{bundle, nats::Nats, relay::Relay, server::Server, worker::Worker};
 use serde_json::{Value, json};

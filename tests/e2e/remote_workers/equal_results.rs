@@ -3,7 +3,7 @@
 use super::{
     EPISODES, ReferenceRun, many_shards, resume, server_config, wait_for_workers, worker_config,
 };
-use crate::{Team, kills::copy_folder};
+use crate::{Team, shared_folder::copy_folder};
 use async_nats::Message;
 use bytes::Bytes;
 use faceoff_tests::{nats::Nats, relay::Relay, repository, server::Server, worker::Worker};

@@ -140,7 +140,7 @@ async fn trial_is_visible_to_organisers_only() {
         .problem(409, "conflict", &["cannot be applied"]);
     post(&site, &format!("{proposal}/drop"), json!({}))
         .await
-        .problem(409, "not-confirmed", &["would never count", "Qualifying"]);
+        .problem(409, "not-confirmed", &["will never count", "Qualifying"]);
     let confirmed = json!({ "confirm": "Qualifying" });
     let dropped = post(&site, &format!("{proposal}/drop"), confirmed)
         .await

@@ -259,7 +259,7 @@ async fn deleted_submission_keeps_its_results() {
             json!({ "confirm": "Alpha" }),
             409,
             "not-confirmed",
-            ["striker.tar.gz", "results would stay"],
+            ["striker.tar.gz", "results stay"],
         ),
         (
             json!({ "confirm": 7 }),
