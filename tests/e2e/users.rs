@@ -313,7 +313,7 @@ fn commands_create_list_rotate_and_revoke_tokens() {
     let new_laptop = find_word(&rotated, "fo_person_");
     assert!(!is_valid(&laptop) && is_valid(&new_laptop));
     member(&server, &laptop, "whoami", &[]).expect_refusal(NOT_ALLOWED, &["401"]);
-    // The token of the server's host may revoke the tokens of users, and not rotate them.
+    // The token of the server's operator may revoke the tokens of users, and not rotate them.
     let refused_rotation = admin(&server, &["token", "rotate", laptop_id]);
     refused_rotation.expect_refusal(NOT_ALLOWED, &["403", "only by that user"]);
     for verb in ["rotate", "revoke"] {
@@ -489,7 +489,7 @@ fn commands_register_teams_and_publish_announcements() {
 }
 
 #[test]
-fn server_start_replaces_revoked_host_token() {
+fn server_start_replaces_revoked_operator_token() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let data = scratch.path().join("data");
     let token_file = data.join("admin-token");
@@ -510,14 +510,14 @@ fn server_start_replaces_revoked_host_token() {
 
     let list = admin_as(&server, &grace, &["token", "list", "--json"]).json();
     let list = list.as_array().expect("a list");
-    let host_token = list.iter().find(|token| token["name"] == "admin-token");
-    let host_token_id = id(host_token.expect("the host has a token"));
-    // The host's token cannot be rotated: the file would keep the old one, and the next start would use it.
-    with_token_file(&server, &["token", "rotate", &host_token_id])
+    let operator_token = list.iter().find(|token| token["name"] == "admin-token");
+    let operator_token_id = id(operator_token.expect("the operator has a token"));
+    // The operator's token cannot be rotated: the file would keep the old one, and the next start would use it.
+    with_token_file(&server, &["token", "rotate", &operator_token_id])
         .expect_refusal(REFUSED, &["data folder", "revoke it"]);
-    admin_as(&server, &grace, &["token", "rotate", &host_token_id])
-        .expect_refusal(NOT_ALLOWED, &["only with a token of the host"]);
-    admin_as(&server, &grace, &["token", "revoke", &host_token_id]).expect_success();
+    admin_as(&server, &grace, &["token", "rotate", &operator_token_id])
+        .expect_refusal(NOT_ALLOWED, &["only with a token of the operator"]);
+    admin_as(&server, &grace, &["token", "revoke", &operator_token_id]).expect_success();
     with_token_file(&server, &["people", "list"]).expect_refusal(NOT_ALLOWED, &["401", "revoked"]);
     server.kill();
 

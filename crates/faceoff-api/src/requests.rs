@@ -103,7 +103,7 @@ pub struct EventsQuery {
     pub before: Option<i64>,
     /// Events per page, 1 to 1000. Default: 100.
     pub limit: Option<u32>,
-    /// Return only events with this actor: `organiser` (the host), `person:ID`, `team:ID`, `visitor`, `schedule`,
+    /// Return only events with this actor: `organiser` (the operator), `person:ID`, `team:ID`, `visitor`, `schedule`,
     /// `worker:NAME` or `server`. `person`, `team` and `worker` without an id match all of the kind.
     pub actor: Option<String>,
     /// Return only events about this subject: `season`, `stage:ID`, `day:STAGE/2026-03-01`, `team:ID`, `submission:ID`,

@@ -10,8 +10,8 @@ use std::fmt;
 pub enum SecretKind {
     /// A team's API token.
     Team,
-    /// The API token of the host: the server's operator, who holds the file `admin-token`.
-    Host,
+    /// The API token of the server's operator, who holds the file `admin-token`.
+    Operator,
     /// A user's API token.
     User,
     /// The session cookie of a signed-in browser.
@@ -24,7 +24,7 @@ impl SecretKind {
     const fn prefix(self) -> &'static str {
         match self {
             Self::Team => "fo_team_",
-            Self::Host => "fo_admin_",
+            Self::Operator => "fo_admin_",
             Self::User => "fo_person_",
             Self::Session => "fo_session_",
             Self::Invitation => "fo_invite_",

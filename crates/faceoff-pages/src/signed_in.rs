@@ -46,7 +46,7 @@ impl SignedIn {
         user.ok().flatten()
     }
 
-    /// `None` for API clients of teams and for the host, who have no name.
+    /// `None` for a token of a team or of the operator, which belongs to no user.
     async fn new(app: &App, caller: &Caller) -> Option<Self> {
         let is_organiser = caller.is_organiser();
         Some(Self {

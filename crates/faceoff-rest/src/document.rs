@@ -52,7 +52,7 @@ impl Modify for SecuritySchemes {
             ),
             (
                 "organiser",
-                "An organiser's token (fo_person_…), or the host's (fo_admin_…), which the server creates at its first start",
+                "An organiser's token (fo_person_…), or the operator's (fo_admin_…), which the server creates at its first start",
             ),
         ] {
             components.add_security_scheme(

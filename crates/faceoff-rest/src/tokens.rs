@@ -72,8 +72,8 @@ pub(crate) async fn create_token(
     params(("id" = TokenId, Path)),
     responses(
         (status = 200, body = NewTokenView),
-        (status = 403, description = "another user's token, or one of the host"), (status = 404),
-        (status = 409, description = "it is a session, is revoked or expired, or is the host's token in the data folder"),
+        (status = 403, description = "another user's token, or one of the operator"), (status = 404),
+        (status = 409, description = "it is a session, is revoked or expired, or is the operator's token in the data folder"),
     )
 )]
 pub(crate) async fn rotate_token(

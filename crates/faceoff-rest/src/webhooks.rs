@@ -40,7 +40,7 @@ async fn find(app: &App, caller: &Caller, id: WebhookId) -> Result<Webhook, Prob
 /// Refuses a team's token: if it leaked, webhooks created with it would outlive it.
 fn check_not_team_token(caller: &Caller) -> Result<(), Problem> {
     match caller.principal {
-        Principal::Host | Principal::Organiser(_) | Principal::Member(..) => Ok(()),
+        Principal::Operator | Principal::Organiser(_) | Principal::Member(..) => Ok(()),
         Principal::Team(_) => Err(Problem::new(
             ProblemKind::Forbidden,
             "a team's token cannot create or change webhooks; use a member's token, or an organiser's",

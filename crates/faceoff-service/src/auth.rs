@@ -1,5 +1,5 @@
 //! Authentication: extractors that turn a token or a session cookie into a caller. A caller is a user (organiser or team
-//! member), an API client with a team's token, or the *host*: the operator of the server, who has access to its data folder.
+//! member), an API client with a team's token, or the *operator* of the server, who has access to its data folder.
 
 use crate::{
     app::{App, AppState},
@@ -48,7 +48,7 @@ impl Caller {
     /// The caller as the event log writes it.
     pub const fn actor(&self) -> Actor {
         match &self.principal {
-            Principal::Host => Actor::Host,
+            Principal::Operator => Actor::Operator,
             Principal::Team(team) => Actor::Team(team.id),
             Principal::Organiser(user) | Principal::Member(user, _) => Actor::User(user.id),
         }
@@ -65,22 +65,25 @@ impl Caller {
     /// The team that the caller belongs to or acts for.
     pub const fn team(&self) -> Option<&Team> {
         match &self.principal {
-            Principal::Host | Principal::Organiser(_) => None,
+            Principal::Operator | Principal::Organiser(_) => None,
             Principal::Team(team) | Principal::Member(_, team) => Some(team),
         }
     }
 
-    /// The user; `None` for the host and for a team's API client.
+    /// The user; `None` for the operator and for a team's API client.
     pub const fn user(&self) -> Option<&User> {
         match &self.principal {
-            Principal::Host | Principal::Team(_) => None,
+            Principal::Operator | Principal::Team(_) => None,
             Principal::Organiser(user) | Principal::Member(user, _) => Some(user),
         }
     }
 
-    /// The host, or an organiser.
+    /// The operator, or an organiser.
     pub const fn is_organiser(&self) -> bool {
-        matches!(self.principal, Principal::Host | Principal::Organiser(_))
+        matches!(
+            self.principal,
+            Principal::Operator | Principal::Organiser(_)
+        )
     }
 
     /// Before whom the caller has a place under overload.
@@ -92,7 +95,7 @@ impl Caller {
         }
     }
 
-    /// The id of the user, or of the team whose API client it is; `None`: the host.
+    /// The id of the user, or of the team whose API client it is; `None`: the operator.
     fn owner(&self) -> Option<Uuid> {
         let user = self.user().map(|user| user.id.as_uuid());
         user.or_else(|| self.team().map(|team| team.id.as_uuid()))
@@ -121,7 +124,7 @@ impl Caller {
     /// Describes the caller's token in the message of a refusal.
     fn token_description(&self) -> String {
         match &self.principal {
-            Principal::Host => "the organiser's".into(),
+            Principal::Operator => "the organiser's".into(),
             Principal::Organiser(user) => format!("that of the organiser “{}”", user.name),
             Principal::Team(team) => format!("that of the team “{}”", team.name),
             Principal::Member(user, team) => {

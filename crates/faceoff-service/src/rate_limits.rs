@@ -44,7 +44,7 @@ const CLEANUP_INTERVAL: u32 = 4096;
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum RequestSource {
     Network(Network),
-    /// A user or team with a token that was verified recently; `None`: the host.
+    /// A user or team with a token that was verified recently; `None`: the operator.
     Caller(Option<Uuid>),
 }
 

@@ -34,7 +34,7 @@ struct Generations {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct RecentCaller {
     pub precedence: Precedence,
-    /// The id of the user, or of the team whose API client it is; `None`: the host.
+    /// The id of the user, or of the team whose API client it is; `None`: the operator.
     pub owner: Option<Uuid>,
 }
 

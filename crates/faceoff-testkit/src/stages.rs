@@ -88,7 +88,9 @@ pub async fn change_rules(
         rules: Some(rules),
         ..StageChange::default()
     };
-    store.change_stage(Actor::Host, stage, change, now).await
+    store
+        .change_stage(Actor::Operator, stage, change, now)
+        .await
 }
 
 /// Changes the settings of a stage.
@@ -107,7 +109,9 @@ pub async fn change_settings(
         settings: Some(settings),
         ..StageChange::default()
     };
-    store.change_stage(Actor::Host, stage, change, now).await
+    store
+        .change_stage(Actor::Operator, stage, change, now)
+        .await
 }
 
 /// Lets a stage accept only agents of these runtimes; `None` accepts all.

@@ -12,7 +12,7 @@ pub async fn create_team(store: &Store, name: &str, now: Timestamp) -> Team {
     let token_hash = *blake3::hash(name.as_bytes()).as_bytes();
     store
         .create_team(
-            Actor::Host,
+            Actor::Operator,
             &name.parse().unwrap(),
             token_hash,
             Requester::default(),

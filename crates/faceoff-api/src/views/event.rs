@@ -13,7 +13,7 @@ pub struct EventView {
     pub id: i64,
     /// When it happened.
     pub at: Timestamp,
-    /// Who or what made the change: `organiser` (the host: the server's operator, who holds the file `admin-token`),
+    /// Who or what made the change: `organiser` (the server's operator, who holds the file `admin-token`),
     /// `person:ID`, `team:ID`, `visitor`, `schedule`, `worker:NAME` or `server`.
     #[schema(example = "organiser")]
     pub actor: String,

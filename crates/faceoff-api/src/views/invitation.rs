@@ -22,7 +22,7 @@ pub struct InvitationView {
     pub person: Option<UserId>,
     /// A label for lists, e.g. the invited person's name.
     pub note: String,
-    /// The user who made it; null: the host, or the server for a registered team.
+    /// The user who made it; null: the operator, or the server for a registered team.
     pub made_by: Option<UserId>,
     /// When it was created.
     pub created_at: Timestamp,

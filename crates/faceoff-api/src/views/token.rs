@@ -18,10 +18,10 @@ pub struct TokenView {
     /// The team that it acts for, if it is a team's token; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub team: Option<TeamId>,
-    /// The user that it acts for, if it is a user's token. Without `team` and `person` it is the host's.
+    /// The user that it acts for, if it is a user's token. Without `team` and `person` it is the operator's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub person: Option<UserId>,
-    /// The user who made it or rotated it last; null: the host, or the server.
+    /// The user who made it or rotated it last; null: the operator, or the server.
     pub made_by: Option<UserId>,
     /// When it was created.
     pub created_at: Timestamp,

@@ -33,9 +33,9 @@ pub struct CallerView {
     /// token in the file `admin-token` and an organiser's rights).
     #[schema(example = "member")]
     pub role: String,
-    /// The user; null for a team's API client and the host.
+    /// The user; null for a team's API client and the operator.
     pub person: Option<UserView>,
-    /// The caller's team; null for organisers and the host.
+    /// The caller's team; null for organisers and the operator.
     pub team: Option<TeamView>,
     /// The token or session of the request.
     pub token: TokenView,

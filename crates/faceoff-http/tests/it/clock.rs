@@ -211,6 +211,6 @@ async fn future_day_is_told_and_can_be_voided() {
     site.next_day();
     assert_eq!(start_due(&site).await, 2);
     assert_eq!(next_day().await, "2026-03-03");
-    let again = site.store.start_day(Actor::Host, stage, site.now());
+    let again = site.store.start_day(Actor::Operator, stage, site.now());
     assert!(again.await.is_err(), "a day has one cutoff");
 }

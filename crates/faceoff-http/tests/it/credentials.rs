@@ -67,13 +67,13 @@ async fn removed_organiser_does_not_come_back() {
     let team = post(&site, "/teams", &grace.token, &json!({ "name": "Alpha" })).await;
     let team = team.json(201);
     let laptop = new_token(&site, &grace.token, json!({ "name": "laptop" })).await;
-    let by_host = new_token(&site, ADMIN, json!({ "name": "second" })).await;
+    let by_operator = new_token(&site, ADMIN, json!({ "name": "second" })).await;
     let webhook = new_webhook(&site, &grace.token).await;
-    // The secret of the host's token would outlive the account.
-    let rotate = format!("/tokens/{}/rotate", string(&by_host["id"]));
+    // The secret of the operator's token would outlive the account.
+    let rotate = format!("/tokens/{}/rotate", string(&by_operator["id"]));
     post(&site, &rotate, &grace.token, &json!({}))
         .await
-        .problem(403, "forbidden", &["only with a token of the host"]);
+        .problem(403, "forbidden", &["only with a token of the operator"]);
 
     let removed = remove(&site, &linus.token, &grace, "Grace").await;
     let ended = &removed["ended"];
@@ -96,7 +96,11 @@ async fn removed_organiser_does_not_come_back() {
         assert_invitation_revoked(&site, &code).await;
     }
     // What others made stays, and so do accounts.
-    for secret in [&linus.token, &barbara.token, &string(&by_host["secret"])] {
+    for secret in [
+        &linus.token,
+        &barbara.token,
+        &string(&by_operator["secret"]),
+    ] {
         get(&site, "/whoami", secret).await;
     }
     let path = format!("/webhooks/{}", string(&webhook["id"]));

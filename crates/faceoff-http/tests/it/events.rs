@@ -32,7 +32,7 @@ async fn events_are_filtered_by_actor_subject_and_kind() {
     assert_eq!(
         found.last().map(String::as_str),
         Some("token_created"),
-        "the host's token"
+        "the operator's token"
     );
     assert_eq!(found[found.len() - 2], "season_named");
     for kind in ["submission_uploaded", "token_replaced", "day_started"] {

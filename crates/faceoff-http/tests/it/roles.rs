@@ -8,7 +8,7 @@ use reqwest::Method;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// The roles, in the order of the table's columns. The host is the operator of the server, whose token needs no user.
+/// The roles, in the order of the table's columns. The last role is the operator of the server, whose token belongs to no user.
 const ROLES: [&str; 7] = [
     "visitor",
     "another team's token",
@@ -16,7 +16,7 @@ const ROLES: [&str; 7] = [
     "the team's token",
     "the team's member",
     "an organiser",
-    "the host",
+    "the operator",
 ];
 
 /// For each route, the result of a request by each role: `+` allowed (done, or refused for its content), `?` a token is

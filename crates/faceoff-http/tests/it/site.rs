@@ -31,7 +31,7 @@ use std::{
 };
 use tokio::{net::TcpListener, sync::oneshot, task::JoinHandle};
 
-/// The host's token, which has an organiser's rights.
+/// The operator's token, which has an organiser's rights.
 pub const ADMIN: &str = "fo_admin_0123456789abcdef";
 /// Largest bundle that the site accepts.
 pub const MAX_BUNDLE_BYTES: u64 = 64 * 1024;
@@ -320,12 +320,12 @@ impl Site {
         let start: Timestamp = "2026-03-01T10:00:00Z".parse().unwrap();
         assert!(
             store
-                .set_host_token(hash_token(ADMIN), start)
+                .set_operator_token(hash_token(ADMIN), start)
                 .await
                 .unwrap()
         );
         store
-            .name_season(Actor::Host, "Test season", start)
+            .name_season(Actor::Operator, "Test season", start)
             .await
             .unwrap();
         let schedule = daily_at.map(Schedule::daily);
@@ -383,7 +383,7 @@ impl Site {
         let made_at = store.archived_season().unwrap().made_at;
         assert!(
             store
-                .set_host_token(hash_token(ADMIN), made_at)
+                .set_operator_token(hash_token(ADMIN), made_at)
                 .await
                 .unwrap()
         );
@@ -608,7 +608,7 @@ impl Site {
     pub async fn evaluate(&self, team: &TestTeam, submission: &str) -> String {
         match self
             .store
-            .start_day(Actor::Host, self.stage().await, self.now())
+            .start_day(Actor::Operator, self.stage().await, self.now())
             .await
         {
             Ok(_) | Err(StoreError::CutoffPassed { .. }) => {}
@@ -704,7 +704,7 @@ impl Site {
             ..plan()
         };
         let stage = configure_stage(&self.store, &plan, None, self.now()).await;
-        let started = self.store.start_day(Actor::Host, stage, self.now());
+        let started = self.store.start_day(Actor::Operator, stage, self.now());
         let started = started.await.unwrap();
         let mut by_name = BTreeMap::new();
         for evaluation in &started {

@@ -266,7 +266,7 @@ async fn tokens_are_created_rotated_and_revoked_at_once() {
 }
 
 #[tokio::test]
-async fn host_token_is_replaced_without_a_restart() {
+async fn operator_token_is_replaced_without_a_restart() {
     let site = Site::start().await;
     let created = post(&site, "/tokens", ADMIN, &json!({ "name": "second" }))
         .await

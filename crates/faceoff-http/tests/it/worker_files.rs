@@ -235,7 +235,7 @@ async fn banned_worker_loses_access() {
     let worker = "rack-1".parse().unwrap();
     let ban = site
         .store
-        .ban_worker(Actor::Host, &worker, "it lies", site.now());
+        .ban_worker(Actor::Operator, &worker, "it lies", site.now());
     ban.await.unwrap();
     send(&site, Method::GET, &path, &sealed, "").await.problem(
         403,

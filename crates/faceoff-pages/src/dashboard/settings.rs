@@ -111,7 +111,7 @@ async fn page(
     page_with(&app, &caller, Notice::Done(&notice), None).await
 }
 
-/// The calling user. A token of a team or of the host has no account.
+/// The calling user. A token of a team or of the operator belongs to no user.
 fn calling_user(caller: &Caller) -> Result<UserId, Problem> {
     match caller.user() {
         Some(user) => Ok(user.id),

@@ -27,7 +27,7 @@ const MAX_NOTE_CHARS: usize = 80;
 /// Whether the caller may see and revoke an invitation: organisers all, a member those to the own team.
 fn may_manage(caller: &Caller, invitation: &Invitation) -> bool {
     match (&caller.principal, invitation.role) {
-        (Principal::Host | Principal::Organiser(_), _) => true,
+        (Principal::Operator | Principal::Organiser(_), _) => true,
         (Principal::Member(_, own_team), InvitationRole::Member(team)) => own_team.id == team,
         (Principal::Member(..) | Principal::Team(_), _) => false,
     }
@@ -86,7 +86,7 @@ pub async fn invitations_after(
     limit: u32,
 ) -> Result<Option<Vec<Invitation>>, Problem> {
     let team = match &caller.principal {
-        Principal::Host | Principal::Organiser(_) => None,
+        Principal::Operator | Principal::Organiser(_) => None,
         Principal::Member(_, own_team) => Some(own_team.id),
         Principal::Team(_) => return Ok(after.is_none().then(Vec::new)),
     };

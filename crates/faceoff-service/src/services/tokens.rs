@@ -1,5 +1,5 @@
-//! API tokens: listing, creating, rotating and revoking them. A *token* belongs to a user, a team or the host (the server's
-//! operator). Rotating replaces its secret.
+//! API tokens: listing, creating, rotating and revoking them. A *token* belongs to a user, a team or the server's
+//! operator. Rotating replaces its secret.
 
 use crate::{
     app::AppState,
@@ -26,7 +26,7 @@ const MAX_NAME_CHARS: usize = 80;
 /// request was sent with, for a team's API client. A leaked token must not end others, or get the secret of one that lasts longer.
 const fn manageable(caller: &Caller) -> Option<TokensOf> {
     match &caller.principal {
-        Principal::Host | Principal::Organiser(_) => Some(TokensOf::Everyone),
+        Principal::Operator | Principal::Organiser(_) => Some(TokensOf::Everyone),
         Principal::Member(user, team) => Some(TokensOf::Member(user.id, team.id)),
         Principal::Team(_) => None,
     }
@@ -81,11 +81,11 @@ pub async fn valid_tokens(app: &AppState, caller: &Caller) -> Result<Vec<Token>,
 /// `Forbidden` or `NotFound` if the caller may not create such a token.
 fn new_token_owner(caller: &Caller, team: Option<TeamId>) -> Result<TokenOwner, Problem> {
     match (&caller.principal, team) {
-        (Principal::Host, None) => Ok(TokenOwner::Host),
+        (Principal::Operator, None) => Ok(TokenOwner::Operator),
         (Principal::Organiser(user) | Principal::Member(user, _), None) => {
             Ok(TokenOwner::User(user.id))
         }
-        (Principal::Host | Principal::Organiser(_), Some(id)) => Ok(TokenOwner::Team(id)),
+        (Principal::Operator | Principal::Organiser(_), Some(id)) => Ok(TokenOwner::Team(id)),
         (Principal::Member(_, own_team), Some(id)) if own_team.id == id => Ok(TokenOwner::Team(id)),
         (Principal::Member(..), Some(_)) => Err(Problem::not_found("team")),
         // A leaked team token must not create tokens that outlive it.
@@ -106,7 +106,7 @@ pub async fn create_token(
     let owner = new_token_owner(caller, new.team)?;
     let name = text::single_line("name", &new.name, MAX_NAME_CHARS)?;
     let kind = match owner {
-        TokenOwner::Host => SecretKind::Host,
+        TokenOwner::Operator => SecretKind::Operator,
         TokenOwner::Team(id) => {
             app.store.team(id).await?;
             SecretKind::Team
@@ -148,15 +148,15 @@ pub async fn rotate_token(
             "a user's token can be rotated only by that user; you can revoke it (DELETE /api/v1/tokens/ID)",
         ));
     }
-    // A user could act as the host after the end of the own account.
-    if token.owner == TokenOwner::Host && caller.principal != Principal::Host {
+    // A user could act as the operator after the end of the own account.
+    if token.owner == TokenOwner::Operator && caller.principal != Principal::Operator {
         return Err(Problem::new(
             ProblemKind::Forbidden,
-            "the host's tokens can be rotated only with a token of the host; you can revoke it (DELETE /api/v1/tokens/ID)",
+            "the operator's tokens can be rotated only with a token of the operator; you can revoke it (DELETE /api/v1/tokens/ID)",
         ));
     }
     let kind = match token.owner {
-        TokenOwner::Host => SecretKind::Host,
+        TokenOwner::Operator => SecretKind::Operator,
         TokenOwner::Team(_) => SecretKind::Team,
         TokenOwner::User(_) => SecretKind::User,
     };
@@ -184,7 +184,7 @@ pub async fn revoke_token(
 ) -> Result<RevokedTokenView, Problem> {
     let token = find(app, caller, id).await?;
     let is_own = match (&caller.principal, token.owner) {
-        (Principal::Host, TokenOwner::Host) | (Principal::Team(_), _) => true,
+        (Principal::Operator, TokenOwner::Operator) | (Principal::Team(_), _) => true,
         (Principal::Organiser(user) | Principal::Member(user, _), TokenOwner::User(id)) => {
             user.id == id
         }

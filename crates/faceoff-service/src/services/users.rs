@@ -92,7 +92,7 @@ pub async fn accept_terms(app: &AppState, caller: &Caller, version: u32) -> Resu
     let Some(user) = caller.user() else {
         return Err(Problem::new(
             ProblemKind::Forbidden,
-            "expected a user's token, got a team's or the host's; a member of the team accepts the terms with their own \
+            "expected a user's token, got a team's or the operator's; a member of the team accepts the terms with their own \
              token",
         ));
     };

@@ -5,7 +5,7 @@ use faceoff_store::{Token, TokenKind, TokenOwner};
 
 pub fn view(token: Token) -> TokenView {
     let (team, person) = match token.owner {
-        TokenOwner::Host => (None, None),
+        TokenOwner::Operator => (None, None),
         TokenOwner::Team(id) => (Some(id), None),
         TokenOwner::User(id) => (None, Some(id)),
     };

@@ -25,7 +25,7 @@ pub fn view(user: User) -> UserView {
 /// The caller of a request.
 pub fn caller(principal: Principal, token: TokenView) -> CallerView {
     let (role, user, team) = match principal {
-        Principal::Host => ("host", None, None),
+        Principal::Operator => ("host", None, None),
         Principal::Organiser(user) => ("organiser", Some(user), None),
         Principal::Team(team) => ("team", None, Some(team)),
         Principal::Member(user, team) => ("member", Some(user), Some(team)),

@@ -7,8 +7,8 @@ use std::{fmt, str::FromStr};
 /// The cause of a change.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum Actor {
-    /// An organiser without a user account: by the host's token, or by the server's configuration.
-    Host,
+    /// An organiser without a user account: by the operator's token, or by the server's configuration.
+    Operator,
     /// A client with a token of the team itself.
     Team(TeamId),
     /// A user, organiser or member.
@@ -26,7 +26,7 @@ pub enum Actor {
 impl fmt::Display for Actor {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Host => f.write_str("organiser"),
+            Self::Operator => f.write_str("organiser"),
             Self::Team(id) => write!(f, "team:{id}"),
             Self::User(id) => write!(f, "person:{id}"),
             Self::Visitor => f.write_str("visitor"),
@@ -42,7 +42,7 @@ impl FromStr for Actor {
     fn from_str(s: &str) -> Result<Self, Self::Err> {
         let unknown = || ParseEventError(s.to_owned());
         Ok(match s.split_once(':') {
-            None if s == "organiser" => Self::Host,
+            None if s == "organiser" => Self::Operator,
             None if s == "schedule" => Self::Schedule,
             None if s == "server" => Self::Server,
             None if s == "visitor" => Self::Visitor,
@@ -63,7 +63,7 @@ mod tests {
     #[test]
     fn actor_parses_back_from_its_text() {
         let actors = [
-            Actor::Host,
+            Actor::Operator,
             Actor::Team(TeamId::new()),
             Actor::User(UserId::new()),
             Actor::Visitor,

@@ -141,7 +141,7 @@ async fn joined_by(tx: &mut Tx, mut creators: Vec<Creator>) -> Result<Vec<User>>
 /// The subject of events about a token of this owner.
 pub(crate) const fn subject(owner: TokenOwner) -> Subject {
     match owner {
-        TokenOwner::Host => Subject::Season,
+        TokenOwner::Operator => Subject::Season,
         TokenOwner::Team(id) => Subject::Team(id),
         TokenOwner::User(id) => Subject::User(id),
     }

@@ -16,7 +16,7 @@ use sqlx::SqliteConnection;
 /// The user and the token of a request. The default is the server itself.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Requester {
-    /// `None`: the host, a team's API client or the server.
+    /// `None`: the operator, a team's API client or the server.
     pub user: Option<UserId>,
     /// The token or session, with the hash of its secret: another secret makes requests with the old one invalid.
     pub token: Option<(TokenId, [u8; 32])>,

@@ -317,7 +317,7 @@ impl Store {
         zone: IanaTimeZone,
         now: Timestamp,
     ) -> Result<()> {
-        self.write(Actor::Host, now, async |tx| {
+        self.write(Actor::Operator, now, async |tx| {
             check_rules(&rules, &settings)?;
             let Some(id) = stages::find_configured(tx).await? else {
                 if !stages::all(tx).await?.is_empty() {

@@ -155,7 +155,7 @@ impl Store {
     pub async fn retire_team(&self, actor: Actor, id: TeamId, now: Timestamp) -> Result<Team> {
         self.write(actor.clone(), now, async |tx| {
             let is_by_organiser = match actor {
-                Actor::Host => true,
+                Actor::Operator => true,
                 Actor::User(user) => users::find(tx, user).await?.team.is_none(),
                 _ => false,
             };

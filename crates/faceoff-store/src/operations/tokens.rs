@@ -1,5 +1,5 @@
 //! Tokens of API clients and sessions of browsers: creation, verification, rotation (replacement of the secret) and
-//! revocation. The host's token belongs to the operator of the server, who can read its file in the data folder.
+//! revocation. The operator's token is in a file of the data folder; the *operator* runs the server and can read that file.
 
 use crate::{
     boxed,
@@ -35,11 +35,11 @@ pub struct VerifiedToken {
     pub principal: Principal,
 }
 
-/// The user, team or host that a token authenticates.
+/// The user, team or operator that a token authenticates.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Principal {
     /// The operator with access to the data folder.
-    Host,
+    Operator,
     Team(Team),
     Organiser(User),
     Member(User, Team),
@@ -75,8 +75,8 @@ pub struct RevokedToken {
     pub ended: EndedCredentials,
 }
 
-/// Name of the host token that is kept in a file of the data folder.
-const HOST_TOKEN_NAME: &str = "admin-token";
+/// Name of the operator's token that is kept in a file of the data folder.
+const OPERATOR_TOKEN_NAME: &str = "admin-token";
 
 /// Adds a token. [`StoreError::Conflict`] if its owner has [`MAX_TOKENS`].
 pub(crate) async fn add_token(tx: &mut Tx, new: NewToken) -> Result<Token> {
@@ -133,7 +133,7 @@ async fn principal_of(
     token: &Token,
 ) -> Result<Option<Principal>> {
     Ok(match token.owner {
-        TokenOwner::Host => Some(Principal::Host),
+        TokenOwner::Operator => Some(Principal::Operator),
         TokenOwner::Team(id) => Some(Principal::Team(teams::find(connection, id).await?)),
         TokenOwner::User(id) => {
             let user = users::find(connection, id).await?;
@@ -263,7 +263,7 @@ impl Store {
 
     /// Replaces the secret of a token; the old secret is invalid from now on, and its expiry remains. From now on it belongs to
     /// what the requester has made, unless its creator is the same or it renews itself. [`StoreError::Conflict`] if the token is a session,
-    /// is expired or revoked, or is the host's, whose file would still have the old secret.
+    /// is expired or revoked, or is the operator's, whose file would still have the old secret.
     #[boxed]
     pub async fn rotate_token(
         &self,
@@ -284,9 +284,9 @@ impl Store {
                     "a session has no secret that could be rotated: end it, or sign in again",
                 );
             }
-            if token.owner == TokenOwner::Host && token.name == HOST_TOKEN_NAME {
+            if token.owner == TokenOwner::Operator && token.name == OPERATOR_TOKEN_NAME {
                 return StoreError::conflict(
-                    "the host's token is a file in the server's data folder (admin-token), which would keep the old one: \
+                    "the operator's token is a file in the server's data folder (admin-token), which would keep the old one: \
                      revoke it, and the server writes a new one at its next start",
                 );
             }
@@ -335,17 +335,17 @@ impl Store {
         .await
     }
 
-    /// Makes the token with this hash the host's token, and revokes the previous one. False if the token is revoked or
-    /// expired, so that the host needs a new one.
+    /// Makes the token with this hash the operator's token, and revokes the previous one. False if the token is revoked or
+    /// expired, so that the operator needs a new one.
     #[boxed]
-    pub async fn set_host_token(&self, hash: [u8; 32], now: Timestamp) -> Result<bool> {
+    pub async fn set_operator_token(&self, hash: [u8; 32], now: Timestamp) -> Result<bool> {
         self.write_even_archived(Actor::Server, now, async |tx| {
             if let Some(existing) = tokens::by_hash(tx, hash).await? {
-                return Ok(existing.owner == TokenOwner::Host && existing.is_valid(now));
+                return Ok(existing.owner == TokenOwner::Operator && existing.is_valid(now));
             }
-            let previous = tokens::of_host(tx).await?.into_iter().filter(|token| {
-                token.owner == TokenOwner::Host
-                    && token.name == HOST_TOKEN_NAME
+            let previous = tokens::of_operator(tx).await?.into_iter().filter(|token| {
+                token.owner == TokenOwner::Operator
+                    && token.name == OPERATOR_TOKEN_NAME
                     && token.revoked_at.is_none()
             });
             for token in previous {
@@ -354,8 +354,8 @@ impl Store {
             let new = NewToken {
                 hash,
                 kind: TokenKind::ApiToken,
-                owner: TokenOwner::Host,
-                name: HOST_TOKEN_NAME.to_owned(),
+                owner: TokenOwner::Operator,
+                name: OPERATOR_TOKEN_NAME.to_owned(),
                 requester: Requester::default(),
                 expires_at: None,
             };

@@ -102,7 +102,7 @@ impl Store {
 
     /// Removes a user: all tokens and sessions are revoked at once, and all that the user has made ends. The name stays in the log.
     /// [`StoreError::Conflict`] if the user has left, or if no one could organise the season afterwards: there is no other
-    /// organiser and no valid host token.
+    /// organiser and no valid token of the operator.
     #[boxed]
     pub async fn remove_user(
         &self,
@@ -120,8 +120,8 @@ impl Store {
             revoke_all(tx, TokenOwner::User(id), None).await?;
             let reason = "the account of the user who made it is closed";
             let ended = revoke_created_by(tx, id, None, reason).await?;
-            // Checked last: a token of the host may have ended, too.
-            if is_last && tokens::count_valid(tx, TokenOwner::Host, now).await? == 0 {
+            // Checked last: a token of the operator may have ended, too.
+            if is_last && tokens::count_valid(tx, TokenOwner::Operator, now).await? == 0 {
                 return StoreError::conflict(format!(
                     "{} is the last who can organise: invite another organiser first",
                     user.name

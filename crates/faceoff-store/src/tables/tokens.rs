@@ -12,8 +12,8 @@ use std::cmp::Reverse;
 /// The owner of a token, as whom its requests act.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TokenOwner {
-    /// The host: any process that can read the data folder. It acts as an organiser.
-    Host,
+    /// The operator: any process that can read the data folder. It acts as an organiser.
+    Operator,
     /// A team's API clients.
     Team(TeamId),
     /// A user, with their role.
@@ -23,7 +23,7 @@ pub enum TokenOwner {
 impl TokenOwner {
     const fn kind(self) -> &'static str {
         match self {
-            Self::Host => "host",
+            Self::Operator => "host",
             Self::Team(_) => "team",
             Self::User(_) => "person",
         }
@@ -32,14 +32,14 @@ impl TokenOwner {
     const fn team(self) -> Option<TeamId> {
         match self {
             Self::Team(id) => Some(id),
-            Self::Host | Self::User(_) => None,
+            Self::Operator | Self::User(_) => None,
         }
     }
 
     const fn user(self) -> Option<UserId> {
         match self {
             Self::User(id) => Some(id),
-            Self::Host | Self::Team(_) => None,
+            Self::Operator | Self::Team(_) => None,
         }
     }
 
@@ -47,7 +47,7 @@ impl TokenOwner {
         match (team, user) {
             (Some(team), _) => Self::Team(team),
             (None, Some(user)) => Self::User(user),
-            (None, None) => Self::Host,
+            (None, None) => Self::Operator,
         }
     }
 }
@@ -74,7 +74,7 @@ impl TokenKind {
 /// when the user gets a new password or new access.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Creator {
-    /// `None`: the host, a visitor or the server.
+    /// `None`: the operator, a visitor or the server.
     pub user: Option<UserId>,
     /// The token or session of the request.
     pub token: Option<TokenId>,
@@ -226,8 +226,8 @@ pub(crate) async fn list(
     Ok(rows.into_iter().map(Token::from).collect())
 }
 
-/// The host's tokens, valid or not.
-pub(crate) async fn of_host(connection: &mut SqliteConnection) -> Result<Vec<Token>> {
+/// The operator's tokens, valid or not.
+pub(crate) async fn of_operator(connection: &mut SqliteConnection) -> Result<Vec<Token>> {
     let rows = select_tokens!("WHERE owner = 'host' ORDER BY created_at")
         .fetch_all(connection)
         .await?;
@@ -275,7 +275,7 @@ pub(crate) async fn valid(
 }
 
 /// Deletes at most `limit` tokens and sessions that ended at `ended_before` or earlier. What was made with them counts as made with
-/// what they were made with, so that it still ends with that. Tokens of the host stay: a revoked one in the file of a restored data
+/// what they were made with, so that it still ends with that. Tokens of the operator stay: a revoked one in the file of a restored data
 /// folder must be recognised. Returns the number of tokens.
 pub(crate) async fn forget_ended(
     connection: &mut SqliteConnection,

@@ -45,7 +45,7 @@ impl TestStore {
         };
         self.store
             .request_ablation(
-                Actor::Host,
+                Actor::Operator,
                 submission,
                 faceoff_airhockey::RULESET,
                 &plan,

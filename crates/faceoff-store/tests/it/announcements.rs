@@ -9,7 +9,7 @@ async fn announcements_and_questions_are_stored() {
     let alpha = f.create_team("Alpha").await;
     for title in ["first", "second"] {
         f.store
-            .announce(Actor::Host, title, "text", f.now)
+            .announce(Actor::Operator, title, "text", f.now)
             .await
             .unwrap();
         f.advance_clock_s(1);
@@ -35,7 +35,7 @@ async fn announcements_and_questions_are_stored() {
     for is_public in [false, true] {
         let answered = f
             .store
-            .answer(Actor::Host, question.id, "At 10:00.", is_public, f.now)
+            .answer(Actor::Operator, question.id, "At 10:00.", is_public, f.now)
             .await
             .unwrap();
         let answer = answered.answer.unwrap();

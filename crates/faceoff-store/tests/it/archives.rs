@@ -155,7 +155,7 @@ async fn season_with_queued_day() -> (TestStore, EvaluationId) {
         expires_at: f.now + jiff::SignedDuration::from_hours(1),
     };
     f.store
-        .invite(Actor::Host, invitation, f.now)
+        .invite(Actor::Operator, invitation, f.now)
         .await
         .unwrap();
     f.store
@@ -170,7 +170,7 @@ async fn season_with_queued_day() -> (TestStore, EvaluationId) {
         secret: [9; 32],
         requester: Requester::default(),
     };
-    let webhook = f.store.create_webhook(Actor::Host, webhook, f.now);
+    let webhook = f.store.create_webhook(Actor::Operator, webhook, f.now);
     let webhook = webhook.await.unwrap().id;
     let delivery = f.store.test_webhook(webhook, "test", "{}", f.now);
     delivery.await.unwrap();
@@ -326,12 +326,14 @@ async fn public_archive_omits_lifted_rulings_and_private_answers() {
     f.evaluate(alpha.id, &one_shard_plan()).await;
     f.run_all_with_score(1.0).await;
     for (team, reason) in [(alpha.team, "it copied"), (beta.team, "it attacked")] {
-        let disqualified = f.store.disqualify_team(Actor::Host, team, reason, f.now);
+        let disqualified = f
+            .store
+            .disqualify_team(Actor::Operator, team, reason, f.now);
         disqualified.await.unwrap();
     }
     let reinstated = f
         .store
-        .reinstate_team(Actor::Host, alpha.team, "it did not copy", f.now);
+        .reinstate_team(Actor::Operator, alpha.team, "it did not copy", f.now);
     reinstated.await.unwrap();
     for public in [true, false] {
         let question = f
@@ -341,7 +343,7 @@ async fn public_archive_omits_lifted_rulings_and_private_answers() {
             .unwrap();
         let answer = f
             .store
-            .answer(Actor::Host, question.id, "so", public, f.now);
+            .answer(Actor::Operator, question.id, "so", public, f.now);
         answer.await.unwrap();
     }
     let folder = export(&f, Edition::Public).await;
@@ -380,7 +382,7 @@ async fn snapshot_is_unaffected_by_later_changes() {
     assert_eq!(snapshot.open_evaluations, 2);
     let before = snapshot.store().evaluation(finished).await.unwrap();
     f.store
-        .void_evaluation(Actor::Host, finished, "a mistake", f.now)
+        .void_evaluation(Actor::Operator, finished, "a mistake", f.now)
         .await
         .unwrap();
     assert_eq!(snapshot.store().evaluation(finished).await.unwrap(), before);
@@ -582,12 +584,12 @@ async fn import_removes_planted_credentials() {
         .unwrap();
     assert_eq!(count, 0);
     // The new server's own token works.
-    assert!(imported.set_host_token([9; 32], f.now).await.unwrap());
+    assert!(imported.set_operator_token([9; 32], f.now).await.unwrap());
     let verified = imported
         .verify_token([9; 32], TokenKind::ApiToken, f.now)
         .await
         .unwrap();
-    assert!(matches!(verified.unwrap().principal, Principal::Host));
+    assert!(matches!(verified.unwrap().principal, Principal::Operator));
 }
 
 #[tokio::test]
@@ -606,7 +608,7 @@ async fn public_archive_has_only_games_that_count() {
     };
     let cup = f
         .store
-        .open_tournament(Actor::Host, &tournament, f.now)
+        .open_tournament(Actor::Operator, &tournament, f.now)
         .await
         .unwrap();
     let friendly =
@@ -624,7 +626,7 @@ async fn public_archive_has_only_games_that_count() {
             }],
         };
         f.store
-            .start_round(Actor::Host, cup.id, &round, f.now)
+            .start_round(Actor::Operator, cup.id, &round, f.now)
             .await
             .unwrap();
         if number == 1 {

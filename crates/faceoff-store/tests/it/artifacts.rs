@@ -112,7 +112,7 @@ async fn recordings_are_deleted_a_day_after_the_evaluation() {
         .await
         .unwrap();
     f.store
-        .cancel_evaluation(Actor::Host, evaluation.id, "rain", f.now)
+        .cancel_evaluation(Actor::Operator, evaluation.id, "rain", f.now)
         .await
         .unwrap();
     // A backup that started before the evaluation ended may still read the recordings.

@@ -12,9 +12,13 @@ const DAY_S: i64 = 86_400;
 async fn set_clock(f: &mut TestStore, by_s: i64) {
     f.advance_clock_s(by_s);
     let by = SignedDuration::from_secs(by_s);
-    let accepted =
-        f.store
-            .accept_clock_step(Actor::Host, by, "a step".into(), f.now, Box::new(|| true));
+    let accepted = f.store.accept_clock_step(
+        Actor::Operator,
+        by,
+        "a step".into(),
+        f.now,
+        Box::new(|| true),
+    );
     accepted.await.unwrap();
 }
 
@@ -51,9 +55,13 @@ async fn refused_step_changes_nothing() {
     f.start_evaluation(&two_shard_plan()).await;
     let later = f.now + SignedDuration::from_secs(DAY_S);
     let by = SignedDuration::from_secs(DAY_S);
-    let refused =
-        f.store
-            .accept_clock_step(Actor::Host, by, "a step".into(), later, Box::new(|| false));
+    let refused = f.store.accept_clock_step(
+        Actor::Operator,
+        by,
+        "a step".into(),
+        later,
+        Box::new(|| false),
+    );
     assert_conflict(refused.await, &["set again"]);
     assert!(f.claim().await.is_some());
 }
@@ -128,7 +136,7 @@ async fn voided_future_day_frees_the_schedule() {
 
     let voided = f
         .store
-        .void_day(Actor::Host, future.stage_day, "clock", f.now);
+        .void_day(Actor::Operator, future.stage_day, "clock", f.now);
     assert_eq!(voided.await.unwrap(), 1);
     assert_eq!(f.store.future_day(&first, f.now).await.unwrap(), None);
     assert_eq!(next_date(&f).await, Some(date(2026, 3, 2)));

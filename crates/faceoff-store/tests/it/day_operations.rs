@@ -28,7 +28,7 @@ async fn frozen_board_omits_later_results() {
     f.advance_clock_s(24 * 3600);
     let freeze = async |f: &TestStore| {
         f.store
-            .freeze_boards(Actor::Host, stage, REASON, f.now)
+            .freeze_boards(Actor::Operator, stage, REASON, f.now)
             .await
     };
     freeze(&f).await.unwrap();
@@ -60,7 +60,8 @@ async fn frozen_board_omits_later_results() {
     let shown = f.store.board_within(stage, revision, &excluding).await;
     assert_eq!(scores(&shown.unwrap()), [1.0, 2.0]);
 
-    let unfreeze = async |f: &TestStore| f.store.unfreeze_boards(Actor::Host, stage, f.now).await;
+    let unfreeze =
+        async |f: &TestStore| f.store.unfreeze_boards(Actor::Operator, stage, f.now).await;
     unfreeze(&f).await.unwrap();
     assert_conflict(unfreeze(&f).await, &["not frozen"]);
     assert_eq!(f.store.board_freeze(stage).await.unwrap(), None);
@@ -70,7 +71,9 @@ async fn frozen_board_omits_later_results() {
         ["boards_frozen", "boards_unfrozen"]
     );
     let unknown = StageId::new();
-    let result = f.store.freeze_boards(Actor::Host, unknown, REASON, f.now);
+    let result = f
+        .store
+        .freeze_boards(Actor::Operator, unknown, REASON, f.now);
     assert!(matches!(result.await, Err(StoreError::NotFound("stage"))));
 }
 
@@ -88,7 +91,7 @@ async fn missed_day_runs_on_its_date_with_active_submissions() {
         let date: Date = date.parse().unwrap();
         let stage_day = StageDay { date, ..first };
         f.store
-            .start_missed_day(Actor::Host, stage_day, REASON, f.now)
+            .start_missed_day(Actor::Operator, stage_day, REASON, f.now)
             .await
     };
     f.advance_clock_s(60);
@@ -171,7 +174,7 @@ async fn add_extra(
     replaces: bool,
 ) -> Result<Evaluation, StoreError> {
     f.store
-        .add_extra_evaluation(Actor::Host, stage_day, team, REASON, replaces, f.now)
+        .add_extra_evaluation(Actor::Operator, stage_day, team, REASON, replaces, f.now)
         .await
 }
 
@@ -246,7 +249,7 @@ async fn extra_evaluation_of_released_day_gets_new_episodes() {
     assert_eq!(failed, extra_evaluation.id);
     let rerun = f
         .store
-        .rerun_evaluation(Actor::Host, extra_evaluation.id, f.now);
+        .rerun_evaluation(Actor::Operator, extra_evaluation.id, f.now);
     let rerun = rerun.await.unwrap();
     assert_eq!(rerun.extra_for.as_deref(), Some(REASON));
     let (claim, run, shard) = f.claim_shard().await;
@@ -305,7 +308,7 @@ async fn extra_evaluation_uses_rules_of_its_day() {
     );
     let disqualified = f
         .store
-        .disqualify_team(Actor::Host, beta.team, REASON, f.now);
+        .disqualify_team(Actor::Operator, beta.team, REASON, f.now);
     disqualified.await.unwrap();
     let result = add_extra(&f, day.stage_day, beta.team, true).await;
     assert!(

@@ -74,7 +74,7 @@ async fn concurrent_day_starts_make_one_cutoff() {
             other.clone()
         };
         let now = f.now;
-        tokio::spawn(async move { store.start_day(Actor::Host, stage, now).await })
+        tokio::spawn(async move { store.start_day(Actor::Operator, stage, now).await })
     });
     let mut evaluations = 0;
     for attempt in attempts.collect::<Vec<_>>() {
@@ -217,7 +217,7 @@ async fn cancelled_evaluation_loses_leases_and_can_be_rerun() {
     let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
     f.store
-        .cancel_evaluation(Actor::Host, evaluation.id, "power cut announced", f.now)
+        .cancel_evaluation(Actor::Operator, evaluation.id, "power cut announced", f.now)
         .await
         .unwrap();
     assert!(!f.store.heartbeat(&claim, 1, LEASE_S, f.now).await.unwrap());
@@ -235,11 +235,13 @@ async fn cancelled_evaluation_loses_leases_and_can_be_rerun() {
     );
     let repeated = f
         .store
-        .cancel_evaluation(Actor::Host, evaluation.id, "", f.now)
+        .cancel_evaluation(Actor::Operator, evaluation.id, "", f.now)
         .await;
     assert!(matches!(repeated, Err(StoreError::Conflict(_))));
     assert!(f.claim().await.is_none(), "there is no automatic rerun");
-    let rerun = f.store.rerun_evaluation(Actor::Host, evaluation.id, f.now);
+    let rerun = f
+        .store
+        .rerun_evaluation(Actor::Operator, evaluation.id, f.now);
     assert_eq!(rerun.await.unwrap().submission, submission.id);
 }
 
@@ -310,7 +312,7 @@ async fn scheduled_day_starts_once() {
     expect_cutoff_passed(
         other
             .start_day(
-                Actor::Host,
+                Actor::Operator,
                 f.configure_stage(&six_shard_plan()).await,
                 f.now,
             )
@@ -438,7 +440,11 @@ async fn withdrawn_submission_skips_days_until_chosen_again() {
     assert_eq!(f.board().await.len(), 2);
     f.advance_clock_s(24 * 3600);
     let stage = f.configure_stage(&one_shard_plan()).await;
-    let started = f.store.start_day(Actor::Host, stage, f.now).await.unwrap();
+    let started = f
+        .store
+        .start_day(Actor::Operator, stage, f.now)
+        .await
+        .unwrap();
     let evaluated: Vec<_> = started
         .iter()
         .map(|evaluation| evaluation.submission)

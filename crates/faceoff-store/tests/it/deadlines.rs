@@ -208,7 +208,7 @@ async fn deadline_ends_open_evaluations_and_releases_the_day() {
     // An organiser can rerun the evaluation, without a deadline.
     let rerun = f
         .store
-        .rerun_evaluation(Actor::Host, id_of(alpha.team), f.now)
+        .rerun_evaluation(Actor::Operator, id_of(alpha.team), f.now)
         .await
         .unwrap();
     f.advance_clock_s(3600);
@@ -263,7 +263,7 @@ async fn closed_stage_continues_its_day_until_the_deadline() {
         closes_at: Some(Some(time("2026-03-01T12:00:00Z"))),
         ..StageChange::default()
     };
-    let changed = f.store.change_stage(Actor::Host, stage, closing, f.now);
+    let changed = f.store.change_stage(Actor::Operator, stage, closing, f.now);
     changed.await.unwrap();
     start_day(&f, stage).await;
     f.advance_clock_s(4 * 3600);

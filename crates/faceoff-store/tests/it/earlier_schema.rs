@@ -132,16 +132,16 @@ async fn filled_store() -> TestStore {
     let (submissions, stage_day) = f.released_day().await;
     let trial = f
         .store
-        .propose_trial(Actor::Host, stage_day.stage, None, "a reason", f.now);
+        .propose_trial(Actor::Operator, stage_day.stage, None, "a reason", f.now);
     let trial = trial.await.unwrap().id;
     f.run_all_with_score(2.0).await;
-    let dropped = f.store.drop_proposal(Actor::Host, trial, f.now);
+    let dropped = f.store.drop_proposal(Actor::Operator, trial, f.now);
     dropped.await.unwrap();
     f.advance_clock_s(25 * 3600);
     assert_eq!(f.store.remove_dropped_datasets(f.now).await.unwrap(), 2);
     for is_applied in [true, false] {
         let proposed = f.store.propose_reevaluation(
-            Actor::Host,
+            Actor::Operator,
             Reevaluation::Day(stage_day),
             "a reason",
             f.now,
@@ -149,7 +149,7 @@ async fn filled_store() -> TestStore {
         let proposed = proposed.await.unwrap().id;
         if is_applied {
             f.run_all_with_score(2.0).await;
-            let applied = f.store.apply_proposal(Actor::Host, proposed, f.now);
+            let applied = f.store.apply_proposal(Actor::Operator, proposed, f.now);
             applied.await.unwrap();
         }
     }
@@ -167,7 +167,7 @@ async fn filled_store() -> TestStore {
             .map(|submission| submission.team)
             .collect(),
     };
-    let cup = f.store.open_tournament(Actor::Host, &cup, f.now);
+    let cup = f.store.open_tournament(Actor::Operator, &cup, f.now);
     let round = DrawnRound {
         number: RoundNumber::FIRST,
         groups: Vec::new(),
@@ -177,7 +177,7 @@ async fn filled_store() -> TestStore {
         }],
     };
     let cup = cup.await.unwrap().id;
-    let started = f.store.start_round(Actor::Host, cup, &round, f.now);
+    let started = f.store.start_round(Actor::Operator, cup, &round, f.now);
     started.await.unwrap();
     f
 }

@@ -31,7 +31,7 @@ async fn events_record_each_step_of_a_submission() {
         .unwrap();
     f.store
         .set_team_token(
-            Actor::Host,
+            Actor::Operator,
             submission.team,
             [9; 32],
             Requester::default(),
@@ -41,7 +41,7 @@ async fn events_record_each_step_of_a_submission() {
         .unwrap();
     let mut records = stored_events(&f).await;
     let first = records.remove(0);
-    assert_eq!(first.actor, Actor::Host);
+    assert_eq!(first.actor, Actor::Operator);
     assert!(matches!(first.event, Event::StageCreated { .. }));
     assert_eq!(
         event_kinds(&records),
@@ -129,7 +129,7 @@ async fn events_record_each_end_of_an_evaluation() {
             End::Cancelled => {
                 let cancelled =
                     f.store
-                        .cancel_evaluation(Actor::Host, evaluation.id, "rain", f.now);
+                        .cancel_evaluation(Actor::Operator, evaluation.id, "rain", f.now);
                 cancelled.await.unwrap();
             }
             End::PlatformFailed => {
@@ -163,9 +163,12 @@ async fn failed_operation_changes_nothing_and_sends_no_event() {
     let evaluation = f.start_evaluation(&six_shard_plan()).await;
     let cancelled = f
         .store
-        .cancel_evaluation(Actor::Host, evaluation.id, "rain", f.now);
+        .cancel_evaluation(Actor::Operator, evaluation.id, "rain", f.now);
     cancelled.await.unwrap();
-    let rerun = || f.store.rerun_evaluation(Actor::Host, evaluation.id, f.now);
+    let rerun = || {
+        f.store
+            .rerun_evaluation(Actor::Operator, evaluation.id, f.now)
+    };
     rerun().await.unwrap();
     let events_before = stored_events(&f).await;
     let (mut events, mut signal) = (f.store.events(), f.store.job_signal());

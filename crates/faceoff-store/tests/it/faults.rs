@@ -73,7 +73,7 @@ async fn evaluation_above_fault_limit_ends_without_score() {
     assert!(f.board().await.is_empty());
     let rerun = f
         .store
-        .rerun_evaluation(Actor::Host, evaluation.id, f.now)
+        .rerun_evaluation(Actor::Operator, evaluation.id, f.now)
         .await;
     assert!(
         matches!(rerun, Err(StoreError::Conflict(_))),

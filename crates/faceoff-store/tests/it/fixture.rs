@@ -108,7 +108,7 @@ impl TestStore {
     /// Starts a day of the season's first stage, which has this plan.
     pub async fn start_day(&self, plan: &RunPlan) -> Result<Vec<Evaluation>, StoreError> {
         let stage = self.configure_stage(plan).await;
-        self.store.start_day(Actor::Host, stage, self.now).await
+        self.store.start_day(Actor::Operator, stage, self.now).await
     }
 
     /// Changes a stage so that it closes after this number of seconds, and advances the clock to that time.
@@ -118,7 +118,7 @@ impl TestStore {
             ..StageChange::default()
         };
         self.store
-            .change_stage(Actor::Host, stage, closing, self.now)
+            .change_stage(Actor::Operator, stage, closing, self.now)
             .await
             .unwrap();
         self.advance_clock_s(seconds);

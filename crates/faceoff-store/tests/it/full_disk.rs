@@ -18,7 +18,7 @@ async fn rolled_back_write_does_not_block_the_writer() {
         let failed = f
             .store
             .create_team(
-                Actor::Host,
+                Actor::Operator,
                 &name,
                 [attempt; 32],
                 Requester::default(),

@@ -66,7 +66,13 @@ async fn child_process_writes_until_killed() {
         token_hash[..16].copy_from_slice(uuid::Uuid::now_v7().as_bytes());
         let name: TeamName = format!("t {} {round}", process.simple()).parse().unwrap();
         let team = store
-            .create_team(Actor::Host, &name, token_hash, Requester::default(), now)
+            .create_team(
+                Actor::Operator,
+                &name,
+                token_hash,
+                Requester::default(),
+                now,
+            )
             .await
             .unwrap();
         report(format!("team {}", team.id));
@@ -79,7 +85,10 @@ async fn child_process_writes_until_killed() {
             requester: Requester::default(),
             expires_at: now + jiff::SignedDuration::from_hours(1),
         };
-        store.invite(Actor::Host, invitation, now).await.unwrap();
+        store
+            .invite(Actor::Operator, invitation, now)
+            .await
+            .unwrap();
         let joined = store
             .join(join_request(code_hash, name.as_str()), now)
             .await
@@ -87,11 +96,17 @@ async fn child_process_writes_until_killed() {
         report(format!("joined {}", joined.user.id));
         if round % 2 == 1 {
             let user = joined.user.id;
-            store.remove_user(Actor::Host, user, now).await.unwrap();
+            store.remove_user(Actor::Operator, user, now).await.unwrap();
             report(format!("left {user}"));
         }
         store
-            .create_submission(Actor::Host, team.id, bundle(), &UploadQuota::default(), now)
+            .create_submission(
+                Actor::Operator,
+                team.id,
+                bundle(),
+                &UploadQuota::default(),
+                now,
+            )
             .await
             .unwrap();
         now += jiff::SignedDuration::from_hours(24);
@@ -105,7 +120,7 @@ async fn child_process_writes_until_killed() {
                     let outcome = valid_outcome("native", "a", "");
                     store.commit_validation(&claim, outcome, now).await.unwrap();
                     report(format!("valid {}", submission.id));
-                    match store.start_day(Actor::Host, stage, now).await {
+                    match store.start_day(Actor::Operator, stage, now).await {
                         Ok(started) => {
                             for evaluation in started {
                                 report(format!("evaluation {}", evaluation.id));
@@ -150,7 +165,7 @@ async fn child_process_writes_until_killed() {
                     if scored.rerun_of.is_some() {
                         let scope = Reevaluation::Evaluation(evaluation);
                         let proposed =
-                            store.propose_reevaluation(Actor::Host, scope, "a test", now);
+                            store.propose_reevaluation(Actor::Operator, scope, "a test", now);
                         match proposed.await {
                             Ok(proposal) => report(format!("proposal {}", proposal.id)),
                             // The day of the evaluation is not released.
@@ -160,15 +175,15 @@ async fn child_process_writes_until_killed() {
                         continue;
                     }
                     let team = scored.team;
-                    let disqualified = store.disqualify_team(Actor::Host, team, "a test", now);
+                    let disqualified = store.disqualify_team(Actor::Operator, team, "a test", now);
                     disqualified.await.unwrap();
                     report(format!("disqualified {team}"));
-                    let reinstated = store.reinstate_team(Actor::Host, team, "done", now);
+                    let reinstated = store.reinstate_team(Actor::Operator, team, "done", now);
                     reinstated.await.unwrap();
-                    let voided = store.void_evaluation(Actor::Host, evaluation, "a test", now);
+                    let voided = store.void_evaluation(Actor::Operator, evaluation, "a test", now);
                     voided.await.unwrap();
                     report(format!("voided {evaluation}"));
-                    let rerun = store.rerun_evaluation(Actor::Host, evaluation, now);
+                    let rerun = store.rerun_evaluation(Actor::Operator, evaluation, now);
                     report(format!("evaluation {}", rerun.await.unwrap().id));
                     change_boards_and_days(&store, stage, scored.stage_day, now, &report).await;
                 }
@@ -190,15 +205,18 @@ async fn change_boards_and_days(
 ) {
     // A killed process may have left the boards frozen.
     if store.board_freeze(stage).await.unwrap().is_none() {
-        let frozen = store.freeze_boards(Actor::Host, stage, "a test", now);
+        let frozen = store.freeze_boards(Actor::Operator, stage, "a test", now);
         frozen.await.unwrap();
     }
-    let unfrozen = store.unfreeze_boards(Actor::Host, stage, now);
+    let unfrozen = store.unfreeze_boards(Actor::Operator, stage, now);
     unfrozen.await.unwrap();
-    let trial = store.propose_trial(Actor::Host, stage, None, "a test", now);
+    let trial = store.propose_trial(Actor::Operator, stage, None, "a test", now);
     let trial = trial.await.unwrap().id;
     report(format!("proposal {trial}"));
-    store.drop_proposal(Actor::Host, trial, now).await.unwrap();
+    store
+        .drop_proposal(Actor::Operator, trial, now)
+        .await
+        .unwrap();
     report(format!("dropped {trial}"));
     // Starts the day before, if it was missed, once in a folder.
     if !store.missed_days().await.unwrap().is_empty() {
@@ -210,7 +228,7 @@ async fn change_boards_and_days(
         .unwrap();
     let missed = StageDay { date, ..stage_day };
     match store
-        .start_missed_day(Actor::Host, missed, "a test", now)
+        .start_missed_day(Actor::Operator, missed, "a test", now)
         .await
     {
         Ok(started) => {
@@ -239,7 +257,7 @@ async fn remove_files(
         retention,
         ..StageChange::default()
     };
-    let changed = store.change_stage(Actor::Host, stage, change, now);
+    let changed = store.change_stage(Actor::Operator, stage, change, now);
     changed.await.unwrap();
     report(format!("keeps {stage}"));
     store.apply_retentions(now).await.unwrap();
@@ -254,7 +272,7 @@ async fn remove_files(
     let quota = UploadQuota::default();
     let mut submissions = Vec::new();
     for _ in 0..2 {
-        let upload = store.create_submission(Actor::Host, team, bundle(), &quota, now);
+        let upload = store.create_submission(Actor::Operator, team, bundle(), &quota, now);
         submissions.push(upload.await.unwrap().id);
     }
     while let Some(ClaimedJob { claim, job }) = store.claim("child", LEASE_S, now).await.unwrap() {
@@ -266,7 +284,7 @@ async fn remove_files(
     }
     let first = submissions[0];
     match store
-        .delete_submission(Actor::Host, first, "by an organiser: a test", now)
+        .delete_submission(Actor::Operator, first, "by an organiser: a test", now)
         .await
     {
         Ok(_) => report(format!("deleted {first}")),
@@ -289,11 +307,11 @@ async fn apply_finished_proposals(store: &Store, now: jiff::Timestamp, report: &
         {
             continue;
         }
-        match store.apply_proposal(Actor::Host, proposal, now).await {
+        match store.apply_proposal(Actor::Operator, proposal, now).await {
             Ok(_) => report(format!("applied {proposal}")),
             // The proposal is a trial that a killed process has left.
             Err(StoreError::Conflict(_)) => {
-                let dropped = store.drop_proposal(Actor::Host, proposal, now);
+                let dropped = store.drop_proposal(Actor::Operator, proposal, now);
                 dropped.await.unwrap();
                 continue;
             }
@@ -301,7 +319,8 @@ async fn apply_finished_proposals(store: &Store, now: jiff::Timestamp, report: &
         }
         let applied = store.evaluation(evaluations[0].id).await.unwrap();
         let (stage_day, team) = (applied.stage_day, applied.team);
-        let extra = store.add_extra_evaluation(Actor::Host, stage_day, team, "a test", true, now);
+        let extra =
+            store.add_extra_evaluation(Actor::Operator, stage_day, team, "a test", true, now);
         report(format!("evaluation {}", extra.await.unwrap().id));
     }
 }
@@ -329,8 +348,11 @@ async fn sign_off(store: &Store, name: &str, now: jiff::Timestamp, report: &impl
         rules,
         settings,
     };
-    let created = store.create_stage(Actor::Host, stage, now).await.unwrap();
-    let signed_off = store.sign_off_stage(Actor::Host, created.id, now + hour);
+    let created = store
+        .create_stage(Actor::Operator, stage, now)
+        .await
+        .unwrap();
+    let signed_off = store.sign_off_stage(Actor::Operator, created.id, now + hour);
     report(format!("finalised {}", signed_off.await.unwrap().id));
 }
 

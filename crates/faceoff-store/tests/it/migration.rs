@@ -842,7 +842,7 @@ async fn migrated_queue_continues() {
         matches!(repeated, Err(StoreError::CutoffPassed { .. })),
         "{repeated:?}"
     );
-    let rerun = f.store.rerun_evaluation(Actor::Host, id(1600), f.now);
+    let rerun = f.store.rerun_evaluation(Actor::Operator, id(1600), f.now);
     assert_eq!(rerun.await.unwrap().submission, id(16));
     // Old recordings are deleted a day after the end of their evaluation, like new ones.
     f.advance_clock_s(86_400);

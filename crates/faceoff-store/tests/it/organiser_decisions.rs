@@ -8,7 +8,7 @@ const REASON: &str = "the table was tilted";
 
 async fn void(f: &TestStore, id: EvaluationId) -> Result<Evaluation, StoreError> {
     f.store
-        .void_evaluation(Actor::Host, id, REASON, f.now)
+        .void_evaluation(Actor::Operator, id, REASON, f.now)
         .await
 }
 
@@ -72,7 +72,7 @@ async fn voided_result_leaves_board_and_can_be_rerun() {
     );
     assert_conflict(void(&f, second.id).await, &["only a counting evaluation"]);
 
-    let rerun = f.store.rerun_evaluation(Actor::Host, second.id, f.now);
+    let rerun = f.store.rerun_evaluation(Actor::Operator, second.id, f.now);
     let rerun = rerun.await.unwrap();
     assert_eq!(
         (rerun.rerun_of, rerun.stage_day),
@@ -82,7 +82,7 @@ async fn voided_result_leaves_board_and_can_be_rerun() {
     assert_eq!(board_rows(&f).await, [("Alpha".to_owned(), 3.0)]);
     let repeated = f
         .store
-        .rerun_evaluation(Actor::Host, second.id, f.now)
+        .rerun_evaluation(Actor::Operator, second.id, f.now)
         .await;
     assert_conflict(repeated, &["counts"]);
 }
@@ -94,7 +94,7 @@ async fn paused_queue_starts_no_job_and_loses_none() {
     let two_shards = two_shard_plan();
     f.evaluate(submission.id, &two_shards).await;
     let (claim, _, shard) = f.claim_shard().await;
-    let pause = async |f: &TestStore| f.store.pause_queue(Actor::Host, REASON, f.now).await;
+    let pause = async |f: &TestStore| f.store.pause_queue(Actor::Operator, REASON, f.now).await;
     pause(&f).await.unwrap();
     assert_conflict(pause(&f).await, &["paused already"]);
     let paused = f.store.season().await.unwrap().queue_pause.unwrap();
@@ -123,7 +123,7 @@ async fn paused_queue_starts_no_job_and_loses_none() {
 
     let mut signal = f.store.job_signal();
     signal.mark_unchanged();
-    let resume = async |f: &TestStore| f.store.resume_queue(Actor::Host, f.now).await;
+    let resume = async |f: &TestStore| f.store.resume_queue(Actor::Operator, f.now).await;
     resume(&f).await.unwrap();
     assert!(signal.has_changed().unwrap(), "idle slots are notified");
     assert_conflict(resume(&f).await, &["not paused"]);
@@ -144,7 +144,7 @@ async fn voided_day_is_over_at_once() {
     let done = f.finish_next_evaluation().await;
     let void_day = async |f: &TestStore| {
         f.store
-            .void_day(Actor::Host, stage_day, REASON, f.now)
+            .void_day(Actor::Operator, stage_day, REASON, f.now)
             .await
     };
     let event_before = newest_event(&f).await;
@@ -173,14 +173,14 @@ async fn voided_day_is_over_at_once() {
     };
     let result = f
         .store
-        .void_day(Actor::Host, not_started, REASON, f.now)
+        .void_day(Actor::Operator, not_started, REASON, f.now)
         .await;
     assert!(
         matches!(result, Err(StoreError::NotFound("day"))),
         "{result:?}"
     );
     for id in [done, open] {
-        let rerun = f.store.rerun_evaluation(Actor::Host, id, f.now);
+        let rerun = f.store.rerun_evaluation(Actor::Operator, id, f.now);
         rerun.await.unwrap();
     }
 }
@@ -196,7 +196,7 @@ async fn disqualified_team_is_excluded_until_reinstated() {
     let disqualify = async |f: &TestStore| {
         let reason = "another team's bundle";
         f.store
-            .disqualify_team(Actor::Host, alpha.team, reason, f.now)
+            .disqualify_team(Actor::Operator, alpha.team, reason, f.now)
             .await
     };
     let team = disqualify(&f).await.unwrap();
@@ -225,11 +225,15 @@ async fn disqualified_team_is_excluded_until_reinstated() {
         .store
         .activate_submission(Actor::Team(team.id), alpha.id, f.now);
     assert_disqualified(choice.await.unwrap_err());
-    let rerun = f.store.rerun_evaluation(Actor::Host, second.id, f.now);
+    let rerun = f.store.rerun_evaluation(Actor::Operator, second.id, f.now);
     assert_disqualified(rerun.await.unwrap_err());
     f.advance_clock_s(24 * 3600);
     let stage = f.configure_stage(&one_shard_plan()).await;
-    let started = f.store.start_day(Actor::Host, stage, f.now).await.unwrap();
+    let started = f
+        .store
+        .start_day(Actor::Operator, stage, f.now)
+        .await
+        .unwrap();
     assert_eq!(
         started
             .iter()
@@ -241,7 +245,7 @@ async fn disqualified_team_is_excluded_until_reinstated() {
 
     let reinstate = async |f: &TestStore| {
         f.store
-            .reinstate_team(Actor::Host, alpha.team, "a mistake", f.now)
+            .reinstate_team(Actor::Operator, alpha.team, "a mistake", f.now)
             .await
     };
     assert_eq!(reinstate(&f).await.unwrap().disqualified, None);
@@ -251,7 +255,7 @@ async fn disqualified_team_is_excluded_until_reinstated() {
         [("Alpha".to_owned(), 1.0), ("Beta".to_owned(), 3.0)]
     );
     // An organiser can rerun the cancelled evaluation.
-    let rerun = f.store.rerun_evaluation(Actor::Host, second.id, f.now);
+    let rerun = f.store.rerun_evaluation(Actor::Operator, second.id, f.now);
     rerun.await.unwrap();
     f.run_all_with_score(4.0).await;
     assert_eq!(board_rows(&f).await[0], ("Alpha".to_owned(), 4.0));

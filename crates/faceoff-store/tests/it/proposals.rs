@@ -9,22 +9,22 @@ const REASON: &str = "the camera was dirty";
 
 async fn propose_trial(f: &TestStore, stage: StageId) -> Result<Proposal, StoreError> {
     f.store
-        .propose_trial(Actor::Host, stage, None, REASON, f.now)
+        .propose_trial(Actor::Operator, stage, None, REASON, f.now)
         .await
 }
 
 async fn propose_reevaluation(f: &TestStore, scope: Reevaluation) -> Result<Proposal, StoreError> {
     f.store
-        .propose_reevaluation(Actor::Host, scope, REASON, f.now)
+        .propose_reevaluation(Actor::Operator, scope, REASON, f.now)
         .await
 }
 
 async fn apply(f: &TestStore, id: ProposalId) -> Result<Proposal, StoreError> {
-    f.store.apply_proposal(Actor::Host, id, f.now).await
+    f.store.apply_proposal(Actor::Operator, id, f.now).await
 }
 
 async fn discard(f: &TestStore, id: ProposalId) -> Result<Proposal, StoreError> {
-    f.store.drop_proposal(Actor::Host, id, f.now).await
+    f.store.drop_proposal(Actor::Operator, id, f.now).await
 }
 
 async fn proposed_evaluations(f: &TestStore, id: ProposalId) -> Vec<ProposedEvaluation> {
@@ -119,15 +119,15 @@ async fn impossible_trial_is_refused() {
     let upload = f.upload(&team).await;
     let refused = f
         .store
-        .propose_trial(Actor::Host, stage, Some(upload.id), REASON, f.now);
+        .propose_trial(Actor::Operator, stage, Some(upload.id), REASON, f.now);
     assert_conflict(refused.await, &["valid"]);
     f.validate().await;
     let proposed = f
         .store
-        .propose_trial(Actor::Host, stage, Some(upload.id), REASON, f.now);
+        .propose_trial(Actor::Operator, stage, Some(upload.id), REASON, f.now);
     let proposed = proposed.await.unwrap();
     assert_conflict(
-        f.store.close_season(Actor::Host, f.now).await,
+        f.store.close_season(Actor::Operator, f.now).await,
         &["1", "trials"],
     );
     // The trial is dropped while a worker runs its shard, and the worker's commit is refused.
@@ -140,7 +140,7 @@ async fn impossible_trial_is_refused() {
     assert!(f.claim().await.is_none());
     f.close_stage_after_s(stage, 1).await;
     assert_conflict(propose_trial(&f, stage).await, &["closed"]);
-    f.store.close_season(Actor::Host, f.now).await.unwrap();
+    f.store.close_season(Actor::Operator, f.now).await.unwrap();
 }
 
 #[tokio::test]
@@ -182,10 +182,12 @@ async fn reevaluation_counts_only_once_applied() {
     f.advance_clock_s(60);
     let frozen = f
         .store
-        .freeze_boards(Actor::Host, stage_day.stage, REASON, f.now);
+        .freeze_boards(Actor::Operator, stage_day.stage, REASON, f.now);
     frozen.await.unwrap();
     assert_conflict(apply(&f, proposed.id).await, &["frozen"]);
-    let unfrozen = f.store.unfreeze_boards(Actor::Host, stage_day.stage, f.now);
+    let unfrozen = f
+        .store
+        .unfreeze_boards(Actor::Operator, stage_day.stage, f.now);
     unfrozen.await.unwrap();
     let applied = apply(&f, proposed.id).await.unwrap();
     assert_eq!(applied.outcome, Some(ProposalOutcome::Applied(f.now)));
@@ -223,7 +225,7 @@ async fn proposal_with_voided_original_is_refused_whole() {
     let beta_evaluation = f.store.evaluations_of(submissions[1].team).await.unwrap()[0].id;
     let voided = f
         .store
-        .void_evaluation(Actor::Host, beta_evaluation, REASON, f.now);
+        .void_evaluation(Actor::Operator, beta_evaluation, REASON, f.now);
     voided.await.unwrap();
     assert_conflict(apply(&f, proposed.id).await, &["does not count any more"]);
     assert_eq!(

@@ -94,7 +94,7 @@ async fn forecast_uses_recent_durations() {
 
     // Evaluations: two shards each, without measured durations.
     let stage = f.configure_stage(&two_shard_plan()).await;
-    let day = f.store.start_day(Actor::Host, stage, f.now).await;
+    let day = f.store.start_day(Actor::Operator, stage, f.now).await;
     let day = day.unwrap();
     let estimate = forecast(&f).await;
     assert!(
@@ -111,7 +111,7 @@ async fn forecast_uses_recent_durations() {
     let gamma = f.create_team("Gamma").await;
     f.upload(&gamma).await;
     run_next_job(&mut f).await;
-    let day = f.store.start_day(Actor::Host, stage, f.now).await;
+    let day = f.store.start_day(Actor::Operator, stage, f.now).await;
     let day = day.unwrap();
     let estimate = forecast(&f).await;
     let mut ends_s: Vec<i64> = day
@@ -156,7 +156,7 @@ async fn paused_queue_has_positions_without_times() {
     f.upload(&alpha).await;
     run_next_job(&mut f).await;
     let upload = f.upload(&alpha).await;
-    let paused = f.store.pause_queue(Actor::Host, "new disks", f.now);
+    let paused = f.store.pause_queue(Actor::Operator, "new disks", f.now);
     paused.await.unwrap();
     let position = forecast(&f).await.submissions[&upload.id];
     assert_eq!(
@@ -164,7 +164,7 @@ async fn paused_queue_has_positions_without_times() {
         (1, 1, None)
     );
     // Durations measured more than a week ago are ignored.
-    f.store.resume_queue(Actor::Host, f.now).await.unwrap();
+    f.store.resume_queue(Actor::Operator, f.now).await.unwrap();
     f.advance_clock_s(8 * 24 * 3600);
     let position = forecast(&f).await.submissions[&upload.id];
     assert_eq!(position.expected_at, None);

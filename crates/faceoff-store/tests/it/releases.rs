@@ -8,7 +8,7 @@ use faceoff_types::{EvaluationId, StageDay};
 use jiff::civil::date;
 
 async fn rerun(f: &TestStore, id: EvaluationId) -> Result<Evaluation, StoreError> {
-    f.store.rerun_evaluation(Actor::Host, id, f.now).await
+    f.store.rerun_evaluation(Actor::Operator, id, f.now).await
 }
 
 async fn released_at(f: &TestStore) -> Option<jiff::Timestamp> {
@@ -89,7 +89,7 @@ async fn day_is_released_by_agent_failure_and_cancellation() {
     assert_eq!(released_at(&f).await, None);
     let result = f
         .store
-        .cancel_evaluation(Actor::Host, cancelled, "rain", f.now);
+        .cancel_evaluation(Actor::Operator, cancelled, "rain", f.now);
     result.await.unwrap();
     assert_eq!(released_at(&f).await, Some(f.now));
 }
@@ -185,7 +185,7 @@ async fn rerun_after_release_uses_submission_of_cutoff() {
     let cancelled = f.evaluate(submission.id, &one_shard_plan()).await;
     let result = f
         .store
-        .cancel_evaluation(Actor::Host, cancelled.id, "wrong runtime", f.now);
+        .cancel_evaluation(Actor::Operator, cancelled.id, "wrong runtime", f.now);
     result.await.unwrap();
     assert_eq!(released_at(&f).await, Some(f.now));
     f.advance_clock_s(1);
@@ -231,14 +231,18 @@ async fn closed_season_refuses_all_operations() {
     let mut f = TestStore::new().await;
     let submission = f.valid_submission_of("alpha").await;
     let evaluation = f.evaluate(submission.id, &six_shard_plan()).await;
-    let error = f.store.close_season(Actor::Host, f.now).await.unwrap_err();
+    let error = f
+        .store
+        .close_season(Actor::Operator, f.now)
+        .await
+        .unwrap_err();
     assert!(error.to_string().starts_with("1 evaluations"), "{error}");
     assert_eq!(f.store.season().await.unwrap().closed_at, None);
     f.store
-        .cancel_evaluation(Actor::Host, evaluation.id, "the end", f.now)
+        .cancel_evaluation(Actor::Operator, evaluation.id, "the end", f.now)
         .await
         .unwrap();
-    f.store.close_season(Actor::Host, f.now).await.unwrap();
+    f.store.close_season(Actor::Operator, f.now).await.unwrap();
     let closed_at = f.now;
 
     f.advance_clock_s(60);
@@ -253,11 +257,13 @@ async fn closed_season_refuses_all_operations() {
         );
     };
     let plan = six_shard_plan();
-    let rerun = f.store.rerun_evaluation(Actor::Host, evaluation.id, f.now);
+    let rerun = f
+        .store
+        .rerun_evaluation(Actor::Operator, evaluation.id, f.now);
     assert_season_closed(rerun.await.unwrap_err());
     let stage = f.store.stages().await.unwrap().remove(0).id;
     let ablation = f.store.request_ablation(
-        Actor::Host,
+        Actor::Operator,
         submission.id,
         faceoff_airhockey::RULESET,
         &plan,
@@ -277,7 +283,7 @@ async fn season_keeps_its_name() {
     assert_eq!(f.store.season().await.unwrap().name, "Season 1");
     for _ in 0..2 {
         f.store
-            .name_season(Actor::Host, "Spring 2026", f.now)
+            .name_season(Actor::Operator, "Spring 2026", f.now)
             .await
             .unwrap();
     }

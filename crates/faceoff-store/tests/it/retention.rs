@@ -20,7 +20,7 @@ async fn run_day(
     dataset_bytes: usize,
 ) -> Vec<EvaluationId> {
     let stage = f.configure_stage(&one_shard_plan()).await;
-    let started = f.store.start_day(Actor::Host, stage, f.now).await;
+    let started = f.store.start_day(Actor::Operator, stage, f.now).await;
     started.unwrap();
     while let Some(ClaimedJob { claim, job }) = f.claim().await {
         match job {
@@ -54,7 +54,7 @@ async fn run_day(
 async fn sign_off(f: &mut TestStore, stage: StageId) {
     f.close_stage_after_s(stage, 3600).await;
     f.store
-        .sign_off_stage(Actor::Host, stage, f.now)
+        .sign_off_stage(Actor::Operator, stage, f.now)
         .await
         .unwrap();
 }
@@ -98,7 +98,7 @@ async fn set_retention(
         ..StageChange::default()
     };
     f.store
-        .change_stage(Actor::Host, stage, change, f.now)
+        .change_stage(Actor::Operator, stage, change, f.now)
         .await
 }
 
@@ -207,7 +207,7 @@ async fn retention_keeps_last_and_best_of_each_team() {
     // A voided evaluation counts neither as one of the last two nor as the best.
     let voided = f
         .store
-        .void_evaluation(Actor::Host, days[1][0], "a test", f.now);
+        .void_evaluation(Actor::Operator, days[1][0], "a test", f.now);
     voided.await.unwrap();
     f.store.apply_retentions(f.now).await.unwrap();
     assert_eq!(
@@ -285,19 +285,19 @@ async fn retention_waits_for_open_evaluations_and_trials() {
     // While a trial (an evaluation on request) is open.
     let trial = f
         .store
-        .propose_trial(Actor::Host, stage, None, "a test", f.now)
+        .propose_trial(Actor::Operator, stage, None, "a test", f.now)
         .await
         .unwrap();
     expect_no_removal(&f).await;
     f.store
-        .drop_proposal(Actor::Host, trial.id, f.now)
+        .drop_proposal(Actor::Operator, trial.id, f.now)
         .await
         .unwrap();
     // While a day is not released.
     let evaluation = f.evaluate(alpha.id, &one_shard_plan()).await;
     expect_no_removal(&f).await;
     f.store
-        .cancel_evaluation(Actor::Host, evaluation.id, "rain", f.now)
+        .cancel_evaluation(Actor::Operator, evaluation.id, "rain", f.now)
         .await
         .unwrap();
     assert_eq!(f.store.apply_retentions(f.now).await.unwrap().datasets, 2);
@@ -319,7 +319,10 @@ async fn retention_keeps_datasets_of_blind_stage() {
         .unwrap();
     let stage = first_stage(&f).await;
     for score in [1.0, 2.0] {
-        f.store.start_day(Actor::Host, stage, f.now).await.unwrap();
+        f.store
+            .start_day(Actor::Operator, stage, f.now)
+            .await
+            .unwrap();
         let (claim, _, shard) = f.claim_shard().await;
         f.commit_shard(&claim, &shard).await;
         let (claim, _) = f.claim_scoring().await;
@@ -373,7 +376,7 @@ async fn retention_ends_at_its_date_or_after_sign_off() {
     f.advance_clock_s(40 * DAY_S);
     assert!(f.store.apply_retentions(f.now).await.unwrap().is_empty());
     f.store
-        .sign_off_stage(Actor::Host, stage, f.now)
+        .sign_off_stage(Actor::Operator, stage, f.now)
         .await
         .unwrap();
     f.advance_clock_s(30 * DAY_S - 1);
@@ -391,7 +394,7 @@ async fn retention_ends_at_its_date_or_after_sign_off() {
         retention: Some(thirty_days),
         ..StageChange::default()
     };
-    let changed = f.store.change_stage(Actor::Host, stage, renamed, f.now);
+    let changed = f.store.change_stage(Actor::Operator, stage, renamed, f.now);
     assert_conflict(changed.await, &["signed off"]);
     assert_eq!(
         f.store.stage_retention(stage).await.unwrap(),
@@ -496,7 +499,7 @@ async fn bundle_is_removed_with_its_last_dataset_unless_active() {
     );
     let plan = one_shard_plan();
     let ablation = f.store.request_ablation(
-        Actor::Host,
+        Actor::Operator,
         old.id,
         faceoff_airhockey::RULESET,
         &plan,
@@ -527,7 +530,7 @@ async fn team_can_delete_unneeded_submission() {
     let trial = f
         .store
         .propose_trial(
-            Actor::Host,
+            Actor::Operator,
             evaluation.stage_day.stage,
             Some(first.id),
             "a test",
@@ -537,7 +540,7 @@ async fn team_can_delete_unneeded_submission() {
         .unwrap();
     assert_conflict(delete(&f, first.id).await, &["not decided yet"]);
     f.store
-        .drop_proposal(Actor::Host, trial.id, f.now)
+        .drop_proposal(Actor::Operator, trial.id, f.now)
         .await
         .unwrap();
 
@@ -581,9 +584,11 @@ async fn team_can_delete_unneeded_submission() {
     assert_conflict(chosen.await, &["was removed", "by its team"]);
     let voided = f
         .store
-        .void_evaluation(Actor::Host, evaluation.id, "a test", f.now);
+        .void_evaluation(Actor::Operator, evaluation.id, "a test", f.now);
     voided.await.unwrap();
-    let rerun = f.store.rerun_evaluation(Actor::Host, evaluation.id, f.now);
+    let rerun = f
+        .store
+        .rerun_evaluation(Actor::Operator, evaluation.id, f.now);
     assert_conflict(rerun.await, &["was removed", "by its team"]);
 }
 
@@ -601,17 +606,17 @@ async fn submission_of_unreleased_day_cannot_be_deleted() {
     let evaluated = f.store.evaluation(finished).await.unwrap().submission;
     assert!([alpha.id, beta.id].contains(&evaluated));
     f.store
-        .withdraw_submission(Actor::Host, evaluated, f.now)
+        .withdraw_submission(Actor::Operator, evaluated, f.now)
         .await
         .unwrap();
     let refusal = f
         .store
-        .delete_submission(Actor::Host, evaluated, "a test", f.now)
+        .delete_submission(Actor::Operator, evaluated, "a test", f.now)
         .await;
     assert_conflict(refusal, &["a day that is not released"]);
     f.run_all_with_score(2.0).await;
     f.store
-        .delete_submission(Actor::Host, evaluated, "a test", f.now)
+        .delete_submission(Actor::Operator, evaluated, "a test", f.now)
         .await
         .unwrap();
     // The deleted submission does not prevent a re-evaluation of the other team.
@@ -620,7 +625,7 @@ async fn submission_of_unreleased_day_cannot_be_deleted() {
     assert_eq!(stage_day.stage, stage);
     let propose = async |scope| {
         f.store
-            .propose_reevaluation(Actor::Host, scope, "a test", f.now)
+            .propose_reevaluation(Actor::Operator, scope, "a test", f.now)
             .await
     };
     let proposal = propose(Reevaluation::Day(stage_day)).await.unwrap();
@@ -658,7 +663,7 @@ async fn evidence_is_exempt_from_retention_and_deletion() {
     };
     delete(&f, deleted_early.id).await.unwrap();
     f.store
-        .disqualify_team(Actor::Host, team.id, "it copied", f.now)
+        .disqualify_team(Actor::Operator, team.id, "it copied", f.now)
         .await
         .unwrap();
     set_retention(&f, stage, keep_last(1)).await.unwrap();
@@ -675,7 +680,7 @@ async fn evidence_is_exempt_from_retention_and_deletion() {
     );
     // Removed files become evidence, too, as long as they exist.
     f.store
-        .disqualify_team(Actor::Host, beta.team, "it attacked", f.now)
+        .disqualify_team(Actor::Operator, beta.team, "it attacked", f.now)
         .await
         .unwrap();
     let EvaluationState::Finished { dataset, .. } = f.state(first_day[1]).await else {
@@ -689,7 +694,7 @@ async fn evidence_is_exempt_from_retention_and_deletion() {
     );
     assert!(has_file(&f, &dataset).await);
     f.store
-        .reinstate_team(Actor::Host, beta.team, "a mistake", f.now)
+        .reinstate_team(Actor::Operator, beta.team, "a mistake", f.now)
         .await
         .unwrap();
     f.store.remove_files_of_removed(f.now).await.unwrap();
@@ -697,7 +702,7 @@ async fn evidence_is_exempt_from_retention_and_deletion() {
 
     // After the reinstatement the usual rules apply.
     f.store
-        .reinstate_team(Actor::Host, team.id, "a mistake", f.now)
+        .reinstate_team(Actor::Operator, team.id, "a mistake", f.now)
         .await
         .unwrap();
     assert_eq!(f.store.apply_retentions(f.now).await.unwrap().datasets, 1);
@@ -717,10 +722,10 @@ async fn team_retired_by_organiser_cannot_delete_files() {
             .await
             .map(|submission| submission.id)
     };
-    retire(Actor::Host).await.unwrap();
+    retire(Actor::Operator).await.unwrap();
     assert_conflict(delete().await, &["an organiser", "kept"]);
     f.store
-        .return_team(Actor::Host, team.id, f.now)
+        .return_team(Actor::Operator, team.id, f.now)
         .await
         .unwrap();
     delete().await.unwrap();

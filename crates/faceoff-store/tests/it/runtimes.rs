@@ -57,7 +57,7 @@ async fn submission_with_unknown_runtime_must_be_uploaded_again() {
         .check_accepts(&active_submission().await)
         .unwrap_err();
     assert!(refused.to_string().contains("upload it again"), "{refused}");
-    let started = f.store.start_day(Actor::Host, stage, f.now).await;
+    let started = f.store.start_day(Actor::Operator, stage, f.now).await;
     let Err(StoreError::Conflict(reason)) = started else {
         panic!("expected a refusal, got {started:?}");
     };
@@ -76,6 +76,6 @@ async fn submission_with_unknown_runtime_must_be_uploaded_again() {
             .check_accepts(&active_submission().await),
         Ok(())
     );
-    let started = f.store.start_day(Actor::Host, stage, f.now).await;
+    let started = f.store.start_day(Actor::Operator, stage, f.now).await;
     assert_eq!(started.unwrap()[0].submission, new.id);
 }

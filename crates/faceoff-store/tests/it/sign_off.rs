@@ -22,7 +22,7 @@ async fn create_stage(f: &TestStore, settings: StageSettings) -> Stage {
             ..settings
         },
     };
-    let created = f.store.create_stage(Actor::Host, stage, f.now);
+    let created = f.store.create_stage(Actor::Operator, stage, f.now);
     created.await.unwrap()
 }
 
@@ -42,7 +42,7 @@ fn settings_with_standings(standings: CountingResult) -> StageSettings {
 }
 
 async fn start_day(f: &TestStore, stage: &Stage) -> Vec<Evaluation> {
-    let started = f.store.start_day(Actor::Host, stage.id, f.now);
+    let started = f.store.start_day(Actor::Operator, stage.id, f.now);
     started.await.unwrap()
 }
 
@@ -56,7 +56,9 @@ async fn change_settings(
 }
 
 async fn sign_off(f: &TestStore, stage: &Stage) -> Result<Stage, StoreError> {
-    f.store.sign_off_stage(Actor::Host, stage.id, f.now).await
+    f.store
+        .sign_off_stage(Actor::Operator, stage.id, f.now)
+        .await
 }
 
 async fn all_events(f: &TestStore) -> Vec<Event> {
@@ -79,7 +81,7 @@ async fn blind_stage_is_opened_once() {
         .unwrap();
     f.run_all_with_score(10.0).await;
     assert_conflict(
-        f.store.close_season(Actor::Host, f.now).await,
+        f.store.close_season(Actor::Operator, f.now).await,
         &["Warm-up", "blind", "set `blind` to false first"],
     );
 
@@ -102,7 +104,7 @@ async fn blind_stage_is_opened_once() {
     assert!(!opened.settings.blind);
     let repeated = change_settings(&f, &stage, |settings| settings.blind = true).await;
     assert_conflict(repeated, &["closed at"]);
-    f.store.close_season(Actor::Host, f.now).await.unwrap();
+    f.store.close_season(Actor::Operator, f.now).await.unwrap();
 }
 
 #[tokio::test]
@@ -123,11 +125,13 @@ async fn signed_off_stage_cannot_be_changed() {
     );
     let cancelled = f
         .store
-        .cancel_evaluation(Actor::Host, started[1].id, "late", f.now);
+        .cancel_evaluation(Actor::Operator, started[1].id, "late", f.now);
     cancelled.await.unwrap();
     f.run_all_with_score(10.0).await;
     let beta = started[1].team;
-    let disqualified = f.store.disqualify_team(Actor::Host, beta, "a test", f.now);
+    let disqualified = f
+        .store
+        .disqualify_team(Actor::Operator, beta, "a test", f.now);
     disqualified.await.unwrap();
 
     f.store.check_can_sign_off(stage.id, f.now).await.unwrap();
@@ -135,7 +139,7 @@ async fn signed_off_stage_cannot_be_changed() {
     let signed_off = sign_off(&f, &stage).await.unwrap();
     let expected = SignOff {
         signed_off_at: f.now,
-        actor: Actor::Host,
+        actor: Actor::Operator,
         disqualified_teams: vec![beta],
     };
     assert_eq!(signed_off.sign_off, Some(expected));
@@ -151,17 +155,19 @@ async fn signed_off_stage_cannot_be_changed() {
     let (stage_day, id) = (started[0].stage_day, started[0].id);
     assert_conflict(
         f.store
-            .void_evaluation(Actor::Host, id, "a test", f.now)
+            .void_evaluation(Actor::Operator, id, "a test", f.now)
             .await,
         &phrases,
     );
     assert_conflict(
         f.store
-            .void_day(Actor::Host, stage_day, "a test", f.now)
+            .void_day(Actor::Operator, stage_day, "a test", f.now)
             .await,
         &phrases,
     );
-    let rerun = f.store.rerun_evaluation(Actor::Host, started[1].id, f.now);
+    let rerun = f
+        .store
+        .rerun_evaluation(Actor::Operator, started[1].id, f.now);
     assert_conflict(rerun.await, &phrases);
     let changed = change_settings(&f, &stage, |settings| {
         settings.publishes = Publication::AtRelease
@@ -171,7 +177,9 @@ async fn signed_off_stage_cannot_be_changed() {
         name: Some("Other".parse().unwrap()),
         ..StageChange::default()
     };
-    let renamed = f.store.change_stage(Actor::Host, stage.id, rename, f.now);
+    let renamed = f
+        .store
+        .change_stage(Actor::Operator, stage.id, rename, f.now);
     assert_conflict(renamed.await, &phrases);
 
     // A later disqualification or reinstatement changes other boards, but not this one.
@@ -190,9 +198,13 @@ async fn signed_off_stage_cannot_be_changed() {
         teams_of(board)
     };
     assert_eq!(board_teams().await, [alpha]);
-    let disqualified = f.store.disqualify_team(Actor::Host, alpha, "a test", f.now);
+    let disqualified = f
+        .store
+        .disqualify_team(Actor::Operator, alpha, "a test", f.now);
     disqualified.await.unwrap();
-    let reinstated = f.store.reinstate_team(Actor::Host, beta, "a test", f.now);
+    let reinstated = f
+        .store
+        .reinstate_team(Actor::Operator, beta, "a test", f.now);
     reinstated.await.unwrap();
     assert_eq!(board_teams().await, [alpha]);
 
@@ -223,7 +235,11 @@ async fn final_day_runs_once_between_close_and_sign_off() {
     let stage = create_stage(&f, settings_with_standings(CountingResult::Final)).await;
     start_day(&f, &stage).await;
     f.run_all_with_score(10.0).await;
-    let start_final_day = async |now| f.store.start_final_day(Actor::Host, stage.id, now).await;
+    let start_final_day = async |now| {
+        f.store
+            .start_final_day(Actor::Operator, stage.id, now)
+            .await
+    };
     assert_conflict(
         start_final_day(f.now).await,
         &["has not closed", "final day comes after"],
@@ -232,7 +248,7 @@ async fn final_day_runs_once_between_close_and_sign_off() {
     f.now = time(CLOSES_AT);
     assert_conflict(sign_off(&f, &stage).await, &["final day", "start it first"]);
     assert_conflict(
-        f.store.close_season(Actor::Host, f.now).await,
+        f.store.close_season(Actor::Operator, f.now).await,
         &["Warm-up", "final day", "start it first"],
     );
 
@@ -284,7 +300,7 @@ async fn final_day_needs_its_own_date_and_a_submission() {
     let without_final_day = create_stage(&f, settings_with_standings(CountingResult::Best)).await;
     let started = f
         .store
-        .start_final_day(Actor::Host, without_final_day.id, f.now);
+        .start_final_day(Actor::Operator, without_final_day.id, f.now);
     assert_conflict(started.await, &["“best”", "no final day"]);
     f.now = time("2026-03-03T09:00:00Z");
     let (rules, settings) = rules_and_settings(&one_shard_plan());
@@ -301,24 +317,24 @@ async fn final_day_needs_its_own_date_and_a_submission() {
     };
     let stage = f
         .store
-        .create_stage(Actor::Host, with_final_day, f.now)
+        .create_stage(Actor::Operator, with_final_day, f.now)
         .await
         .unwrap();
     let started = f
         .store
-        .start_final_day(Actor::Host, stage.id, time(CLOSES_AT));
+        .start_final_day(Actor::Operator, stage.id, time(CLOSES_AT));
     assert_conflict(started.await, &["no team has a valid submission"]);
     f.valid_submission_of("Alpha").await;
     start_day(&f, &stage).await;
     f.run_all_with_score(1.0).await;
     f.now = time(CLOSES_AT);
-    let same_date = f.store.start_final_day(Actor::Host, stage.id, f.now);
+    let same_date = f.store.start_final_day(Actor::Operator, stage.id, f.now);
     assert!(matches!(
         same_date.await,
         Err(StoreError::CutoffPassed { .. })
     ));
     f.advance_clock_s(24 * 3600);
-    let next = f.store.start_final_day(Actor::Host, stage.id, f.now);
+    let next = f.store.start_final_day(Actor::Operator, stage.id, f.now);
     assert_eq!(next.await.unwrap().len(), 1);
 }
 

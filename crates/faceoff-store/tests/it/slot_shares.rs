@@ -213,7 +213,7 @@ impl TestStore {
         let stage = self.configure_stage(plan).await;
         let started = self
             .store
-            .start_day(Actor::Host, stage, self.now)
+            .start_day(Actor::Operator, stage, self.now)
             .await
             .unwrap();
         let mut evaluation_of_submission = None;
@@ -222,7 +222,7 @@ impl TestStore {
                 evaluation_of_submission = Some(evaluation.id);
             } else {
                 let cancelled = self.store.cancel_evaluation(
-                    Actor::Host,
+                    Actor::Operator,
                     evaluation.id,
                     "not part of this test",
                     self.now,
@@ -414,7 +414,7 @@ async fn ablations_run_last_and_scoring_first() {
     };
     s.f.store
         .request_ablation(
-            Actor::Host,
+            Actor::Operator,
             valid_submission,
             faceoff_airhockey::RULESET,
             &one_episode_plan,
@@ -566,7 +566,7 @@ async fn slot_time_charged_is_time_used() {
     s.f.advance_clock_s(4);
     let evaluation = *s.evaluations.keys().next().unwrap();
     s.f.store
-        .cancel_evaluation(Actor::Host, evaluation, "no", s.f.now)
+        .cancel_evaluation(Actor::Operator, evaluation, "no", s.f.now)
         .await
         .unwrap();
     s.f.advance_clock_s(4);

@@ -19,12 +19,12 @@ fn warm_up_stage() -> NewStage {
 }
 
 async fn create_stage(f: &TestStore, stage: NewStage) -> Stage {
-    let created = f.store.create_stage(Actor::Host, stage, f.now);
+    let created = f.store.create_stage(Actor::Operator, stage, f.now);
     created.await.unwrap()
 }
 
 async fn start_day(f: &TestStore, stage: StageId) -> Result<Vec<Evaluation>, StoreError> {
-    f.store.start_day(Actor::Host, stage, f.now).await
+    f.store.start_day(Actor::Operator, stage, f.now).await
 }
 
 async fn change_stage(
@@ -32,7 +32,7 @@ async fn change_stage(
     stage: StageId,
     change: StageChange,
 ) -> Result<Stage, StoreError> {
-    let changed = f.store.change_stage(Actor::Host, stage, change, f.now);
+    let changed = f.store.change_stage(Actor::Operator, stage, change, f.now);
     changed.await
 }
 
@@ -292,7 +292,7 @@ async fn first_stage_follows_configuration_until_changed() {
 #[tokio::test]
 async fn stage_of_closed_season_is_unchangeable() {
     let mut f = TestStore::new().await;
-    f.store.close_season(Actor::Host, f.now).await.unwrap();
+    f.store.close_season(Actor::Operator, f.now).await.unwrap();
     f.advance_clock_s(1);
     let first = f.configure_stage(&six_shard_plan()).await;
     let stage = f.store.stage(first).await.unwrap();

@@ -13,7 +13,13 @@ async fn team_token_is_valid_until_replaced() {
     let name = "Zoë".parse().unwrap();
     let team = f
         .store
-        .create_team(Actor::Host, &name, TOKEN_HASH, Requester::default(), f.now)
+        .create_team(
+            Actor::Operator,
+            &name,
+            TOKEN_HASH,
+            Requester::default(),
+            f.now,
+        )
         .await
         .unwrap();
     assert_eq!(f.store.team(team.id).await.unwrap(), team);
@@ -27,7 +33,7 @@ async fn team_token_is_valid_until_replaced() {
     );
     f.store
         .set_team_token(
-            Actor::Host,
+            Actor::Operator,
             team.id,
             OTHER_TOKEN_HASH,
             Requester::default(),
@@ -47,7 +53,7 @@ async fn two_teams_cannot_share_a_token() {
     let f = TestStore::new().await;
     f.store
         .create_team(
-            Actor::Host,
+            Actor::Operator,
             &"Alpha".parse().unwrap(),
             TOKEN_HASH,
             Requester::default(),
@@ -58,7 +64,7 @@ async fn two_teams_cannot_share_a_token() {
     let beta = f
         .store
         .create_team(
-            Actor::Host,
+            Actor::Operator,
             &"Beta".parse().unwrap(),
             OTHER_TOKEN_HASH,
             Requester::default(),
@@ -69,7 +75,7 @@ async fn two_teams_cannot_share_a_token() {
     let error = f
         .store
         .create_team(
-            Actor::Host,
+            Actor::Operator,
             &"Gamma".parse().unwrap(),
             TOKEN_HASH,
             Requester::default(),
@@ -81,7 +87,7 @@ async fn two_teams_cannot_share_a_token() {
     let error = f
         .store
         .set_team_token(
-            Actor::Host,
+            Actor::Operator,
             beta.id,
             TOKEN_HASH,
             Requester::default(),
@@ -102,19 +108,25 @@ async fn unknown_ids_are_not_found() {
     ));
     assert!(matches!(
         f.store
-            .set_team_token(Actor::Host, id, [1; 32], Requester::default(), f.now)
+            .set_team_token(Actor::Operator, id, [1; 32], Requester::default(), f.now)
             .await,
         Err(StoreError::NotFound("team"))
     ));
     let upload = f
         .store
-        .create_submission(Actor::Host, id, bundle(), &UploadQuota::default(), f.now)
+        .create_submission(
+            Actor::Operator,
+            id,
+            bundle(),
+            &UploadQuota::default(),
+            f.now,
+        )
         .await;
     assert!(matches!(upload, Err(StoreError::NotFound("team"))));
     let submission = uuid::Uuid::now_v7().into();
     let activated = f
         .store
-        .activate_submission(Actor::Host, submission, f.now)
+        .activate_submission(Actor::Operator, submission, f.now)
         .await;
     assert!(matches!(activated, Err(StoreError::NotFound("submission"))));
     let evaluation = uuid::Uuid::now_v7().into();
@@ -122,7 +134,7 @@ async fn unknown_ids_are_not_found() {
         f.store.evaluation(evaluation).await,
         Err(StoreError::NotFound("evaluation"))
     ));
-    let rerun = f.store.rerun_evaluation(Actor::Host, evaluation, f.now);
+    let rerun = f.store.rerun_evaluation(Actor::Operator, evaluation, f.now);
     assert!(matches!(
         rerun.await,
         Err(StoreError::NotFound("evaluation"))

@@ -44,7 +44,7 @@ async fn token_is_valid_until_expired_rotated_or_revoked() {
     let expires_at = f.now + SignedDuration::from_secs(60);
     let create = async |hash, expires_at| {
         f.store
-            .create_token(Actor::Host, new_token(hash, team, expires_at), f.now)
+            .create_token(Actor::Operator, new_token(hash, team, expires_at), f.now)
             .await
     };
     let expiring = create(1, Some(expires_at)).await.unwrap();
@@ -67,7 +67,7 @@ async fn token_is_valid_until_expired_rotated_or_revoked() {
 
     f.store
         .rotate_token(
-            Actor::Host,
+            Actor::Operator,
             unlimited.id,
             [5; 32],
             Requester::default(),
@@ -85,7 +85,7 @@ async fn token_is_valid_until_expired_rotated_or_revoked() {
     let rotated = f
         .store
         .rotate_token(
-            Actor::Host,
+            Actor::Operator,
             expiring.id,
             [6; 32],
             Requester::default(),
@@ -96,14 +96,14 @@ async fn token_is_valid_until_expired_rotated_or_revoked() {
     for _ in 0..2 {
         let revoked = f
             .store
-            .revoke_token(Actor::Host, unlimited.id, EndMade::Keep, f.now)
+            .revoke_token(Actor::Operator, unlimited.id, EndMade::Keep, f.now)
             .await;
         assert_eq!(revoked.unwrap().token.revoked_at, Some(f.now));
     }
     assert_eq!(rejection(&f, 5).await, Some(TokenRejection::Revoked(f.now)));
     let unknown = f
         .store
-        .revoke_token(Actor::Host, TokenId::new(), EndMade::Keep, f.now)
+        .revoke_token(Actor::Operator, TokenId::new(), EndMade::Keep, f.now)
         .await;
     assert!(matches!(unknown, Err(StoreError::NotFound("token"))));
     let events = f.store.events_after(0, 100).await.unwrap();
@@ -120,13 +120,13 @@ async fn token_use_is_recorded_and_tokens_are_limited() {
     let owner = TokenOwner::Team(team.id);
     for hash in 1..u8::try_from(MAX_TOKENS).unwrap() {
         f.store
-            .create_token(Actor::Host, new_token(hash, owner, None), f.now)
+            .create_token(Actor::Operator, new_token(hash, owner, None), f.now)
             .await
             .unwrap();
     }
     let error = f
         .store
-        .create_token(Actor::Host, new_token(200, owner, None), f.now)
+        .create_token(Actor::Operator, new_token(200, owner, None), f.now)
         .await
         .unwrap_err();
     assert!(error.to_string().contains("which is the limit"), "{error}");
@@ -138,32 +138,36 @@ async fn token_use_is_recorded_and_tokens_are_limited() {
     assert_eq!(used.last_used_at, Some(f.now));
     // A revoked token does not count towards the limit.
     f.store
-        .revoke_token(Actor::Host, used.id, EndMade::Keep, f.now)
+        .revoke_token(Actor::Operator, used.id, EndMade::Keep, f.now)
         .await
         .unwrap();
     f.store
-        .create_token(Actor::Host, new_token(200, owner, None), f.now)
+        .create_token(Actor::Operator, new_token(200, owner, None), f.now)
         .await
         .unwrap();
 }
 
 #[tokio::test]
-async fn host_token_follows_its_file_and_stays_revoked() {
+async fn operator_token_follows_its_file_and_stays_revoked() {
     let f = TestStore::new().await;
-    assert!(f.store.set_host_token([1; 32], f.now).await.unwrap());
-    assert!(f.store.set_host_token([1; 32], f.now).await.unwrap());
-    let other_host_token = f
+    assert!(f.store.set_operator_token([1; 32], f.now).await.unwrap());
+    assert!(f.store.set_operator_token([1; 32], f.now).await.unwrap());
+    let other_operator_token = f
         .store
-        .create_token(Actor::Host, new_token(9, TokenOwner::Host, None), f.now)
+        .create_token(
+            Actor::Operator,
+            new_token(9, TokenOwner::Operator, None),
+            f.now,
+        )
         .await
         .unwrap();
-    assert!(f.store.set_host_token([2; 32], f.now).await.unwrap());
+    assert!(f.store.set_operator_token([2; 32], f.now).await.unwrap());
     assert_eq!(rejection(&f, 1).await, Some(TokenRejection::Revoked(f.now)));
     assert_eq!(rejection(&f, 2).await, None);
     assert_eq!(
         rejection(&f, 9).await,
         None,
-        "other host tokens are not affected"
+        "other tokens of the operator are not affected"
     );
     // The token whose secret is in a file cannot be rotated: the next start would restore the old secret from the file.
     let tokens = all_tokens(&f).await;
@@ -172,20 +176,25 @@ async fn host_token_follows_its_file_and_stays_revoked() {
         .find(|token| token.name == "admin-token" && token.revoked_at.is_none());
     let rotate = async |id, hash| {
         f.store
-            .rotate_token(Actor::Host, id, [hash; 32], Requester::default(), f.now)
+            .rotate_token(Actor::Operator, id, [hash; 32], Requester::default(), f.now)
             .await
     };
     let error = rotate(file_token.unwrap().id, 3).await.unwrap_err();
     assert!(error.to_string().contains("revoke it"), "{error}");
     assert_eq!(rejection(&f, 2).await, None, "the token is unchanged");
-    rotate(other_host_token.id, 8).await.unwrap();
-    rotate(other_host_token.id, 9).await.unwrap();
-    assert!(!f.store.set_host_token([1; 32], f.now).await.unwrap());
+    rotate(other_operator_token.id, 8).await.unwrap();
+    rotate(other_operator_token.id, 9).await.unwrap();
+    assert!(!f.store.set_operator_token([1; 32], f.now).await.unwrap());
     f.store
-        .revoke_token(Actor::Host, other_host_token.id, EndMade::Keep, f.now)
+        .revoke_token(
+            Actor::Operator,
+            other_operator_token.id,
+            EndMade::Keep,
+            f.now,
+        )
         .await
         .unwrap();
-    assert!(!f.store.set_host_token([9; 32], f.now).await.unwrap());
+    assert!(!f.store.set_operator_token([9; 32], f.now).await.unwrap());
 }
 
 #[tokio::test]
@@ -203,7 +212,7 @@ async fn makers_of_earlier_versions_come_from_the_log() {
             requester: Requester::default(),
             expires_at: f.now + SignedDuration::from_hours(1),
         };
-        let invited = f.store.invite(Actor::Host, invitation, f.now).await;
+        let invited = f.store.invite(Actor::Operator, invitation, f.now).await;
         invited.unwrap();
         let request = join_request([code; 32], &format!("User {code}"));
         ids.push(f.store.join(request, f.now).await.unwrap().user.id);
@@ -220,7 +229,7 @@ async fn makers_of_earlier_versions_come_from_the_log() {
     let by_first = create(11, Actor::User(first)).await;
     let rotated_by_second = create(12, Actor::User(first)).await;
     let rotated_by_team = create(13, Actor::User(first)).await;
-    let by_host = create(14, Actor::Host).await;
+    let by_operator = create(14, Actor::Operator).await;
     for (token, actor, hash) in [
         (rotated_by_second, Actor::User(second), 22),
         (rotated_by_team, Actor::Team(team.id), 23),
@@ -267,7 +276,7 @@ async fn makers_of_earlier_versions_come_from_the_log() {
     assert_eq!(creator(by_first), Some(first));
     assert_eq!(creator(rotated_by_second), Some(second));
     assert_eq!(creator(rotated_by_team), Some(first));
-    assert_eq!(creator(by_host), None);
+    assert_eq!(creator(by_operator), None);
     let own = tokens
         .iter()
         .filter(|token| token.owner == TokenOwner::User(first));
@@ -297,7 +306,12 @@ async fn tokens_and_invitations_are_listed_page_by_page() {
             _ => TokenOwner::Team(teams[1]),
         };
         let new = new_token(hash, owner, None);
-        created.push(f.store.create_token(Actor::Host, new, f.now).await.unwrap());
+        created.push(
+            f.store
+                .create_token(Actor::Operator, new, f.now)
+                .await
+                .unwrap(),
+        );
     }
     let everyone = all_tokens(&f).await;
     for of in [
@@ -343,7 +357,7 @@ async fn tokens_and_invitations_are_listed_page_by_page() {
             expires_at: f.now + SignedDuration::from_hours(1),
         };
         f.store
-            .invite(Actor::Host, invitation, f.now)
+            .invite(Actor::Operator, invitation, f.now)
             .await
             .unwrap()
             .id
@@ -392,7 +406,7 @@ async fn ended_credentials_are_forgotten_after_a_month() {
             ..new_token(hash, TokenOwner::Team(team), None)
         };
         f.store
-            .create_token(Actor::Host, new, f.now)
+            .create_token(Actor::Operator, new, f.now)
             .await
             .unwrap()
             .id
@@ -403,22 +417,22 @@ async fn ended_credentials_are_forgotten_after_a_month() {
     let leaf = create(&f, 3, Some((next, [9; 32]))).await;
     for ended in [middle, next] {
         f.store
-            .revoke_token(Actor::Host, ended, EndMade::Keep, f.now)
+            .revoke_token(Actor::Operator, ended, EndMade::Keep, f.now)
             .await
             .unwrap();
     }
     // A revoked token in the file of a data folder must not become valid again.
-    assert!(f.store.set_host_token([7; 32], f.now).await.unwrap());
-    let of_host = f.store.verify_token([7; 32], TokenKind::ApiToken, f.now);
-    let of_host = of_host.await.unwrap().unwrap().token.id;
+    assert!(f.store.set_operator_token([7; 32], f.now).await.unwrap());
+    let of_operator = f.store.verify_token([7; 32], TokenKind::ApiToken, f.now);
+    let of_operator = of_operator.await.unwrap().unwrap().token.id;
     f.store
-        .revoke_token(Actor::Host, of_host, EndMade::Keep, f.now)
+        .revoke_token(Actor::Operator, of_operator, EndMade::Keep, f.now)
         .await
         .unwrap();
     let expires_at = f.now + SignedDuration::from_hours(1);
     let expired = new_token(4, TokenOwner::Team(team), Some(expires_at));
     f.store
-        .create_token(Actor::Host, expired, f.now)
+        .create_token(Actor::Operator, expired, f.now)
         .await
         .unwrap();
     let invitation = NewInvitation {
@@ -429,7 +443,7 @@ async fn ended_credentials_are_forgotten_after_a_month() {
         expires_at,
     };
     f.store
-        .invite(Actor::Host, invitation, f.now)
+        .invite(Actor::Operator, invitation, f.now)
         .await
         .unwrap();
 
@@ -454,10 +468,10 @@ async fn ended_credentials_are_forgotten_after_a_month() {
         panic!("{invitations:?}");
     };
     assert!(matches!(accepted.state, InvitationState::Accepted { .. }));
-    assert!(!f.store.set_host_token([7; 32], f.now).await.unwrap());
+    assert!(!f.store.set_operator_token([7; 32], f.now).await.unwrap());
     // What was made with the forgotten tokens still ends with the token that made that one.
     f.store
-        .revoke_token(Actor::Host, root, EndMade::Except(None), f.now)
+        .revoke_token(Actor::Operator, root, EndMade::Except(None), f.now)
         .await
         .unwrap();
     assert_eq!(rejection(&f, 3).await, Some(TokenRejection::Revoked(f.now)));

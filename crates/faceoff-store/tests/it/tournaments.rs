@@ -29,7 +29,7 @@ async fn opened(
         settings: TournamentSettings::default(),
         entrants: teams.clone(),
     };
-    let opened = f.store.open_tournament(Actor::Host, &new, f.now).await;
+    let opened = f.store.open_tournament(Actor::Operator, &new, f.now).await;
     (opened.unwrap(), teams)
 }
 
@@ -57,7 +57,7 @@ async fn start(
     id: TournamentId,
     drawn: &DrawnRound,
 ) -> Result<TournamentRound, StoreError> {
-    f.store.start_round(Actor::Host, id, drawn, f.now).await
+    f.store.start_round(Actor::Operator, id, drawn, f.now).await
 }
 
 /// A tournament of two teams whose first round, of one game, has started.
@@ -292,7 +292,7 @@ async fn round_needs_a_valid_submission_of_each_team() {
     .await;
     let late = f.create_team("Late").await;
     f.store
-        .add_entrants(Actor::Host, cup.id, &[late.id], f.now)
+        .add_entrants(Actor::Operator, cup.id, &[late.id], f.now)
         .await
         .unwrap();
     let round = drawn(1, &[&[[teams[0], late.id]]], &[teams[1]]);
@@ -304,7 +304,7 @@ async fn round_needs_a_valid_submission_of_each_team() {
     let out = departure(late.id, DepartureKind::Withdrawn, None);
     let left = f
         .store
-        .leave_tournament(Actor::Host, cup.id, &out, f.now)
+        .leave_tournament(Actor::Operator, cup.id, &out, f.now)
         .await;
     assert_eq!(
         left.unwrap(),
@@ -316,7 +316,7 @@ async fn round_needs_a_valid_submission_of_each_team() {
     start(&f, cup.id, &two).await.unwrap();
     assert_conflict(
         f.store
-            .add_entrants(Actor::Host, cup.id, &[late.id], f.now)
+            .add_entrants(Actor::Operator, cup.id, &[late.id], f.now)
             .await,
         &["a round is under way"],
     );
@@ -385,18 +385,24 @@ async fn game_with_platform_faults_has_attempts_but_no_result() {
         "a result is missing"
     );
     assert_conflict(
-        f.store.close_tournament(Actor::Host, cup.id, f.now).await,
+        f.store
+            .close_tournament(Actor::Operator, cup.id, f.now)
+            .await,
         &["has no result"],
     );
     let seed = f.store.game(game).await.unwrap().seed;
-    let rerun = f.store.rerun_game(Actor::Host, game, f.now).await.unwrap();
+    let rerun = f
+        .store
+        .rerun_game(Actor::Operator, game, f.now)
+        .await
+        .unwrap();
     assert_eq!((rerun.seed, rerun.state), (seed, GameState::Queued));
     run_next_game(&f).await;
     assert!(record(&f, cup.id).await.rounds[0].over_at.is_some());
     // Its result counts until it is voided; then the game is rerun with the same rules.
     let voided = f
         .store
-        .void_game(Actor::Host, game, REASON, f.now)
+        .void_game(Actor::Operator, game, REASON, f.now)
         .await
         .unwrap();
     assert!(matches!(voided.state, GameState::Void { reason, .. } if reason == REASON));
@@ -411,12 +417,17 @@ async fn game_with_platform_faults_has_attempts_but_no_result() {
         &["have no result"],
     );
     assert_conflict(
-        f.store.void_game(Actor::Host, game, REASON, f.now).await,
+        f.store
+            .void_game(Actor::Operator, game, REASON, f.now)
+            .await,
         &["only a game"],
     );
-    f.store.rerun_game(Actor::Host, game, f.now).await.unwrap();
+    f.store
+        .rerun_game(Actor::Operator, game, f.now)
+        .await
+        .unwrap();
     assert_conflict(
-        f.store.rerun_game(Actor::Host, game, f.now).await,
+        f.store.rerun_game(Actor::Operator, game, f.now).await,
         &["only a game"],
     );
     run_next_game(&f).await;
@@ -432,12 +443,12 @@ async fn paused_tournament_starts_no_game() {
     let (cup, teams) = one_game(&f, faceoff_airhockey::competition().tournament_rules()).await;
     let paused = f
         .store
-        .pause_tournament(Actor::Host, cup.id, REASON, f.now)
+        .pause_tournament(Actor::Operator, cup.id, REASON, f.now)
         .await;
     assert_eq!(paused.unwrap().paused.unwrap().reason, REASON);
     assert_conflict(
         f.store
-            .pause_tournament(Actor::Host, cup.id, REASON, f.now)
+            .pause_tournament(Actor::Operator, cup.id, REASON, f.now)
             .await,
         &["paused already"],
     );
@@ -449,11 +460,13 @@ async fn paused_tournament_starts_no_game() {
     let game = record(&f, cup.id).await.games[0].id;
     assert_eq!(f.store.game_attempts(game).await.unwrap(), []);
     f.store
-        .resume_tournament(Actor::Host, cup.id, f.now)
+        .resume_tournament(Actor::Operator, cup.id, f.now)
         .await
         .unwrap();
     assert_conflict(
-        f.store.resume_tournament(Actor::Host, cup.id, f.now).await,
+        f.store
+            .resume_tournament(Actor::Operator, cup.id, f.now)
+            .await,
         &["not paused"],
     );
     assert_eq!(run_next_game(&f).await, game);
@@ -490,7 +503,7 @@ async fn game_forecast_uses_recent_durations() {
     assert_eq!(position(&f, ids[1]).await, Some((1, 2, at(40))));
     assert_eq!(position(&f, ids[2]).await, Some((2, 2, at(80))));
     f.store
-        .pause_tournament(Actor::Host, cup.id, REASON, f.now)
+        .pause_tournament(Actor::Operator, cup.id, REASON, f.now)
         .await
         .unwrap();
     assert_eq!(
@@ -510,7 +523,7 @@ async fn departure_cancels_open_games() {
     assert_conflict(
         f.store
             .leave_tournament(
-                Actor::Host,
+                Actor::Operator,
                 cup.id,
                 &leave(DepartureKind::Disqualified, Some(round(2))),
                 f.now,
@@ -521,7 +534,7 @@ async fn departure_cancels_open_games() {
     let left = f
         .store
         .leave_tournament(
-            Actor::Host,
+            Actor::Operator,
             cup.id,
             &leave(DepartureKind::Disqualified, None),
             f.now,
@@ -532,7 +545,7 @@ async fn departure_cancels_open_games() {
     assert_conflict(
         f.store
             .leave_tournament(
-                Actor::Host,
+                Actor::Operator,
                 cup.id,
                 &leave(DepartureKind::Withdrawn, None),
                 f.now,
@@ -571,7 +584,7 @@ async fn departure_cancels_open_games() {
         .await
         .unwrap();
     assert_conflict(
-        f.store.rerun_game(Actor::Host, running, f.now).await,
+        f.store.rerun_game(Actor::Operator, running, f.now).await,
         &["only a game"],
     );
 }
@@ -594,13 +607,13 @@ async fn round_ends_after_rerun_of_a_game_of_an_earlier_round() {
     let second = drawn(2, &[&[[b, a]], &[[c, b]], &[[a, c]]], &[c, a, b]);
     start(&f, cup.id, &second).await.unwrap();
     f.store
-        .void_game(Actor::Host, played, REASON, f.now)
+        .void_game(Actor::Operator, played, REASON, f.now)
         .await
         .unwrap();
     let out = departure(c, DepartureKind::Withdrawn, None);
     let left = f
         .store
-        .leave_tournament(Actor::Host, cup.id, &out, f.now)
+        .leave_tournament(Actor::Operator, cup.id, &out, f.now)
         .await
         .unwrap();
     assert_eq!(
@@ -610,7 +623,7 @@ async fn round_ends_after_rerun_of_a_game_of_an_earlier_round() {
     );
     // The game of B and A in the second round is open, and the voided one of the first round.
     f.store
-        .rerun_game(Actor::Host, played, f.now)
+        .rerun_game(Actor::Operator, played, f.now)
         .await
         .unwrap();
     for _ in 0..2 {
@@ -618,7 +631,7 @@ async fn round_ends_after_rerun_of_a_game_of_an_earlier_round() {
     }
     assert!(record(&f, cup.id).await.rounds[1].over_at.is_some());
     f.store
-        .close_tournament(Actor::Host, cup.id, f.now)
+        .close_tournament(Actor::Operator, cup.id, f.now)
         .await
         .unwrap();
 }
@@ -631,7 +644,7 @@ async fn withdrawn_team_plays_the_round_to_its_end() {
     let out = departure(c, DepartureKind::Withdrawn, None);
     let leave = async |request: &DepartureRequest| {
         f.store
-            .leave_tournament(Actor::Host, cup.id, request, f.now)
+            .leave_tournament(Actor::Operator, cup.id, request, f.now)
             .await
     };
     let early = departure(c, DepartureKind::Withdrawn, Some(round(1)));
@@ -666,11 +679,13 @@ async fn cancelled_game_of_an_earlier_round_is_not_waited_for() {
     let second = drawn(2, &[&[[b, a]], &[[c, b]], &[[a, c]]], &[c, a, b]);
     start(&f, cup.id, &second).await.unwrap();
     f.store
-        .void_game(Actor::Host, of_c.id, REASON, f.now)
+        .void_game(Actor::Operator, of_c.id, REASON, f.now)
         .await
         .unwrap();
     let out = departure(c, DepartureKind::Disqualified, None);
-    let left = f.store.leave_tournament(Actor::Host, cup.id, &out, f.now);
+    let left = f
+        .store
+        .leave_tournament(Actor::Operator, cup.id, &out, f.now);
     assert_eq!(left.await.unwrap().unwrap().from_round, round(2));
     assert!(matches!(
         state(&f, of_c.id).await,
@@ -679,7 +694,7 @@ async fn cancelled_game_of_an_earlier_round_is_not_waited_for() {
     run_next_game(&f).await;
     assert!(record(&f, cup.id).await.rounds[1].over_at.is_some());
     f.store
-        .close_tournament(Actor::Host, cup.id, f.now)
+        .close_tournament(Actor::Operator, cup.id, f.now)
         .await
         .unwrap();
 }
@@ -693,12 +708,12 @@ async fn withdrawal_does_not_delay_a_disqualification() {
         let leave = async |request: &DepartureRequest| {
             let left = f
                 .store
-                .leave_tournament(Actor::Host, cup.id, request, f.now);
+                .leave_tournament(Actor::Operator, cup.id, request, f.now);
             left.await.unwrap().unwrap()
         };
         assert_eq!(leave(&request).await.from_round, round(2));
         if of_the_season {
-            let decision = f.store.disqualify_team(Actor::Host, c, REASON, f.now);
+            let decision = f.store.disqualify_team(Actor::Operator, c, REASON, f.now);
             decision.await.unwrap();
         } else {
             leave(&departure(c, DepartureKind::Disqualified, None)).await;
@@ -732,7 +747,7 @@ async fn disqualification_also_applies_after_withdrawal() {
     }
     let leave = async |request: DepartureRequest| {
         f.store
-            .leave_tournament(Actor::Host, cup.id, &request, f.now)
+            .leave_tournament(Actor::Operator, cup.id, &request, f.now)
             .await
     };
     let out = leave(departure(c, DepartureKind::Withdrawn, None))
@@ -755,21 +770,23 @@ async fn disqualification_also_applies_after_withdrawal() {
     let games = record(&f, cup.id).await.games;
     for game in &games[..2] {
         f.store
-            .void_game(Actor::Host, game.id, REASON, f.now)
+            .void_game(Actor::Operator, game.id, REASON, f.now)
             .await
             .unwrap();
     }
     assert_conflict(
-        f.store.rerun_game(Actor::Host, games[1].id, f.now).await,
+        f.store
+            .rerun_game(Actor::Operator, games[1].id, f.now)
+            .await,
         &["by its round"],
     );
     f.store
-        .rerun_game(Actor::Host, games[0].id, f.now)
+        .rerun_game(Actor::Operator, games[0].id, f.now)
         .await
         .unwrap();
     // A team disqualified from the season leaves its tournaments.
     f.store
-        .disqualify_team(Actor::Host, b, REASON, f.now)
+        .disqualify_team(Actor::Operator, b, REASON, f.now)
         .await
         .unwrap();
     assert!(f.claim().await.is_none(), "queued games are cancelled");
@@ -780,7 +797,7 @@ async fn disqualification_also_applies_after_withdrawal() {
         DepartureKind::Disqualified
     );
     assert_conflict(
-        f.store.close_season(Actor::Host, f.now).await,
+        f.store.close_season(Actor::Operator, f.now).await,
         &["Cup", "close it first"],
     );
 }
@@ -797,12 +814,12 @@ async fn friendly_games_have_a_quota_and_wait_for_rounds() {
     let [a, b, base] = teams[..] else { panic!() };
     let out = departure(base, DepartureKind::Withdrawn, None);
     f.store
-        .leave_tournament(Actor::Host, cup.id, &out, f.now)
+        .leave_tournament(Actor::Operator, cup.id, &out, f.now)
         .await
         .unwrap();
     let test = async |f: &TestStore, by| {
         f.store
-            .request_test_game(Actor::Host, cup.id, a, by, f.now)
+            .request_test_game(Actor::Operator, cup.id, a, by, f.now)
             .await
     };
     assert_conflict(test(&f, None).await, &["has no baseline"]);
@@ -817,7 +834,7 @@ async fn friendly_games_have_a_quota_and_wait_for_rounds() {
         ..TournamentChange::default()
     };
     f.store
-        .change_tournament(Actor::Host, cup.id, &change, f.now)
+        .change_tournament(Actor::Operator, cup.id, &change, f.now)
         .await
         .unwrap();
     let friendly = async |f: &TestStore, by, with| {
@@ -873,7 +890,7 @@ async fn friendly_games_have_a_quota_and_wait_for_rounds() {
     assert_eq!(record.games.len(), 1);
     let of_round = f
         .store
-        .cancel_game(Actor::Host, record.games[0].id, "no", f.now)
+        .cancel_game(Actor::Operator, record.games[0].id, "no", f.now)
         .await;
     assert_conflict(of_round, &["cannot be cancelled"]);
 }
@@ -888,7 +905,7 @@ async fn repeated_schedule_has_new_seeds_and_does_not_count() {
     let (cup, teams) = opened(&f, &["A", "B"], once).await;
     let replay = async |times| {
         f.store
-            .request_schedule_replays(Actor::Host, cup.id, times, f.now)
+            .request_schedule_replays(Actor::Operator, cup.id, times, f.now)
             .await
     };
     assert_conflict(replay(1).await, &["0 of 1 rounds have started"]);
@@ -901,10 +918,13 @@ async fn repeated_schedule_has_new_seeds_and_does_not_count() {
     assert_eq!(replay(3).await.unwrap(), 3);
     assert_conflict(replay(998).await, &["expected 1 to 997"]);
     f.store
-        .void_game(Actor::Host, game, REASON, f.now)
+        .void_game(Actor::Operator, game, REASON, f.now)
         .await
         .unwrap();
-    f.store.rerun_game(Actor::Host, game, f.now).await.unwrap();
+    f.store
+        .rerun_game(Actor::Operator, game, f.now)
+        .await
+        .unwrap();
     let (claim, counts, _) = claim_game(&f).await;
     assert!(matches!(
         f.store.game(counts).await.unwrap().purpose,
@@ -925,7 +945,7 @@ async fn repeated_schedule_has_new_seeds_and_does_not_count() {
         .unwrap();
     assert_eq!(
         f.store
-            .cancel_schedule_replays(Actor::Host, cup.id, f.now)
+            .cancel_schedule_replays(Actor::Operator, cup.id, f.now)
             .await
             .unwrap(),
         2
@@ -983,7 +1003,7 @@ async fn closed_tournament_is_final_and_frees_bundles() {
     };
     let change = async || {
         f.store
-            .change_tournament(Actor::Host, cup.id, &rules, f.now)
+            .change_tournament(Actor::Operator, cup.id, &rules, f.now)
             .await
     };
     assert_eq!(change().await.unwrap().rules.steps, 500);
@@ -996,16 +1016,18 @@ async fn closed_tournament_is_final_and_frees_bundles() {
     };
     assert_conflict(
         f.store
-            .change_tournament(Actor::Host, cup.id, &other, f.now)
+            .change_tournament(Actor::Operator, cup.id, &other, f.now)
             .await,
         &["a round has started"],
     );
     assert_conflict(
-        f.store.close_tournament(Actor::Host, cup.id, f.now).await,
+        f.store
+            .close_tournament(Actor::Operator, cup.id, f.now)
+            .await,
         &["1 games are queued or running"],
     );
     assert_conflict(
-        f.store.close_season(Actor::Host, f.now).await,
+        f.store.close_season(Actor::Operator, f.now).await,
         &["1 games are queued"],
     );
     let game = run_next_game(&f).await;
@@ -1019,13 +1041,15 @@ async fn closed_tournament_is_final_and_frees_bundles() {
         &["a tournament that is not closed"],
     );
     f.store
-        .close_tournament(Actor::Host, cup.id, f.now)
+        .close_tournament(Actor::Operator, cup.id, f.now)
         .await
         .unwrap();
     f.store.check_deletable(of_a, f.now).await.unwrap();
     assert_conflict(change().await, &["was closed on"]);
     assert_conflict(
-        f.store.void_game(Actor::Host, game, REASON, f.now).await,
+        f.store
+            .void_game(Actor::Operator, game, REASON, f.now)
+            .await,
         &["was closed on"],
     );
     let twice = NewTournament {
@@ -1035,7 +1059,10 @@ async fn closed_tournament_is_final_and_frees_bundles() {
         settings: TournamentSettings::default(),
         entrants: Vec::new(),
     };
-    let taken = f.store.open_tournament(Actor::Host, &twice, f.now).await;
+    let taken = f
+        .store
+        .open_tournament(Actor::Operator, &twice, f.now)
+        .await;
     assert!(
         matches!(taken, Err(StoreError::TournamentNameTaken(_))),
         "{taken:?}"
@@ -1111,7 +1138,7 @@ async fn run_actions(actions: Vec<Action>) {
     for game in record(&f, cup.id).await.games {
         if let GameState::PlatformFailed { .. } = game.state {
             f.store
-                .rerun_game(Actor::Host, game.id, f.now)
+                .rerun_game(Actor::Operator, game.id, f.now)
                 .await
                 .unwrap();
         }

@@ -15,7 +15,7 @@ async fn invite(f: &TestStore, code: u8, role: InvitationRole) -> Invitation {
         expires_at: f.now + SignedDuration::from_hours(1),
     };
     f.store
-        .invite(Actor::Host, invitation, f.now)
+        .invite(Actor::Operator, invitation, f.now)
         .await
         .unwrap()
 }
@@ -121,10 +121,10 @@ async fn removed_user_loses_all_access() {
     let alpha = f.create_team("Alpha").await;
     let ada = add_user(&f, 1, "Ada", InvitationRole::Member(alpha.id)).await;
     let grace = add_user(&f, 2, "Grace", InvitationRole::Organiser).await;
-    let remove = async |id| f.store.remove_user(Actor::Host, id, f.now).await;
+    let remove = async |id| f.store.remove_user(Actor::Operator, id, f.now).await;
     let error = remove(grace.id).await.unwrap_err();
     assert_contains(&error, &["Grace", "the last who can organise"]);
-    f.store.set_host_token([7; 32], f.now).await.unwrap();
+    f.store.set_operator_token([7; 32], f.now).await.unwrap();
     remove(grace.id).await.unwrap();
     let (removed, _) = remove(ada.id).await.unwrap();
     assert_eq!(removed.left_at, Some(f.now));
@@ -145,7 +145,7 @@ async fn removed_user_loses_all_access() {
         requester: Requester::default(),
         expires_at: f.now + SignedDuration::from_hours(1),
     };
-    let error = f.store.invite(Actor::Host, invitation, f.now).await;
+    let error = f.store.invite(Actor::Operator, invitation, f.now).await;
     assert_contains(&error.unwrap_err(), &["has left"]);
     let events = f.store.events_after(0, 100).await.unwrap();
     let joined = events
@@ -160,7 +160,7 @@ async fn new_terms_block_uploads_until_accepted() {
     let mut f = TestStore::new().await;
     let submission = f.valid_submission_of("Alpha").await;
     let alpha = f.store.team(submission.team).await.unwrap();
-    let publish = async |text| f.store.publish_terms(Actor::Host, text, f.now).await;
+    let publish = async |text| f.store.publish_terms(Actor::Operator, text, f.now).await;
     assert_eq!(publish("Be fair.").await.unwrap().version, 1);
     assert_contains(
         &publish("Be fair.").await.unwrap_err(),
@@ -210,7 +210,7 @@ async fn new_terms_block_uploads_until_accepted() {
     ));
     // The active submission is still evaluated.
     let stage = f.configure_stage(&six_shard_plan()).await;
-    let started = f.store.start_day(Actor::Host, stage, f.now).await;
+    let started = f.store.start_day(Actor::Operator, stage, f.now).await;
     assert_eq!(started.unwrap().len(), 1);
     let accept = async |version| {
         f.store
@@ -265,7 +265,7 @@ async fn team_can_be_renamed_described_and_retired() {
     );
     let divisions = ["Students".parse().unwrap(), "Open".parse().unwrap()];
     f.store
-        .change_season(Actor::Host, None, Some(&divisions), f.now)
+        .change_season(Actor::Operator, None, Some(&divisions), f.now)
         .await
         .unwrap();
     assert_contains(
@@ -280,7 +280,7 @@ async fn team_can_be_renamed_described_and_retired() {
         .await
         .unwrap();
     let stage = f.configure_stage(&six_shard_plan()).await;
-    let empty = f.store.start_day(Actor::Host, stage, f.now).await;
+    let empty = f.store.start_day(Actor::Operator, stage, f.now).await;
     assert_contains(&empty.unwrap_err(), &["no team has a valid submission"]);
     let chosen = f
         .store
@@ -293,14 +293,14 @@ async fn team_can_be_renamed_described_and_retired() {
         .return_team(Actor::Team(id), id, f.now)
         .await
         .unwrap();
-    let started = f.store.start_day(Actor::Host, stage, f.now).await;
+    let started = f.store.start_day(Actor::Operator, stage, f.now).await;
     assert_eq!(started.unwrap().len(), 1);
 }
 
 #[tokio::test]
 async fn requests_under_way_end_with_the_rights_of_their_user() {
     let f = TestStore::new().await;
-    f.store.set_host_token([7; 32], f.now).await.unwrap();
+    f.store.set_operator_token([7; 32], f.now).await.unwrap();
     let grace = add_user(&f, 1, "Grace", InvitationRole::Organiser).await;
     let hash = *blake3::hash(&[1; 32]).as_bytes();
     let verified = f.store.verify_token(hash, TokenKind::ApiToken, f.now).await;
@@ -312,7 +312,7 @@ async fn requests_under_way_end_with_the_rights_of_their_user() {
     let new_token = |hash: u8, requester| NewToken {
         hash: [hash; 32],
         kind: TokenKind::ApiToken,
-        owner: TokenOwner::Host,
+        owner: TokenOwner::Operator,
         name: "late".into(),
         requester,
         expires_at: None,
@@ -359,7 +359,7 @@ async fn requests_under_way_end_with_the_rights_of_their_user() {
     };
     create(24, requester).await.unwrap();
     f.store
-        .remove_user(Actor::Host, grace.id, f.now)
+        .remove_user(Actor::Operator, grace.id, f.now)
         .await
         .unwrap();
     let without_token = Requester {
@@ -404,7 +404,7 @@ async fn sign_in_under_way_fails_after_a_new_password() {
     assert!(!sign_in(31, "old").await);
     assert!(sign_in(32, "new").await);
     f.store
-        .remove_user(Actor::Host, ada.id, f.now)
+        .remove_user(Actor::Operator, ada.id, f.now)
         .await
         .unwrap();
     assert!(!sign_in(33, "new").await);

@@ -51,7 +51,7 @@ async fn ban_requeues_shards_of_open_runs() {
     let ban_reason = async |name: &str| f.store.ban_reason(&worker(name)).await.unwrap();
     assert_eq!(ban_reason("rack-1").await.as_deref(), Some(REASON));
     assert_eq!(ban_reason("rack-10").await, None);
-    let repeated = f.store.ban_worker(Actor::Host, &rack, REASON, f.now);
+    let repeated = f.store.ban_worker(Actor::Operator, &rack, REASON, f.now);
     assert!(matches!(repeated.await, Err(StoreError::Conflict(_))));
 
     // The banned worker's late outcomes change nothing, and other workers run both shards again.
@@ -98,7 +98,7 @@ async fn ban_requeues_shards_of_open_runs() {
     assert_eq!(other.worker_bans().await.unwrap(), bans);
     let readmit = async || {
         f.store
-            .readmit_worker(Actor::Host, &worker("rack-1"), f.now)
+            .readmit_worker(Actor::Operator, &worker("rack-1"), f.now)
             .await
     };
     readmit().await.unwrap();

@@ -387,7 +387,7 @@ impl Server {
         let stage = configure_stage(&self.store, &plan, None, self.now()).await;
         let started = self
             .store
-            .start_day(Actor::Host, stage, self.now())
+            .start_day(Actor::Operator, stage, self.now())
             .await
             .unwrap();
         assert_eq!(started[0].submission, submission.id);

@@ -40,7 +40,7 @@ async fn start_one_game(server: &Server, rules: TournamentRules) -> Game {
     };
     let opened = server
         .store
-        .open_tournament(Actor::Host, &new, server.now());
+        .open_tournament(Actor::Operator, &new, server.now());
     let id = opened.await.unwrap().id;
     let drawn = DrawnRound {
         number: RoundNumber::FIRST,
@@ -52,7 +52,7 @@ async fn start_one_game(server: &Server, rules: TournamentRules) -> Game {
     };
     server
         .store
-        .start_round(Actor::Host, id, &drawn, server.now())
+        .start_round(Actor::Operator, id, &drawn, server.now())
         .await
         .unwrap();
     let mut games = server.store.games(id, GameFilter::Rounds).await.unwrap();
@@ -173,7 +173,7 @@ async fn platform_fault_ends_game_without_result_until_rerun() {
     );
     running.stop().await;
 
-    let rerun = server.store.rerun_game(Actor::Host, game, server.now());
+    let rerun = server.store.rerun_game(Actor::Operator, game, server.now());
     rerun.await.unwrap();
     let healthy_evaluator = {
         let seeds = Arc::clone(&seeds);
@@ -226,7 +226,7 @@ async fn only_the_recording_of_the_last_result_is_kept() {
     }
     let void = server
         .store
-        .void_game(Actor::Host, game, "the table leaned", server.now());
+        .void_game(Actor::Operator, game, "the table leaned", server.now());
     void.await.unwrap();
     for file in &first {
         assert!(
@@ -234,7 +234,7 @@ async fn only_the_recording_of_the_last_result_is_kept() {
             "the files are kept until there is another result"
         );
     }
-    let rerun = server.store.rerun_game(Actor::Host, game, server.now());
+    let rerun = server.store.rerun_game(Actor::Operator, game, server.now());
     rerun.await.unwrap();
     let second = files(&wait_for_result(&server, game).await);
     // The slot removes obsolete recordings before it claims another job.

@@ -121,7 +121,7 @@ async fn cancelled_evaluation_stops_its_slots() {
     starts.recv().await.unwrap();
     server
         .store
-        .cancel_evaluation(Actor::Host, id, "rain", server.now())
+        .cancel_evaluation(Actor::Operator, id, "rain", server.now())
         .await
         .unwrap();
     stops.recv().await.unwrap();

@@ -86,7 +86,7 @@ async fn jobs_do_not_contain_the_season_secret() {
     server
         .store
         .request_ablation(
-            Actor::Host,
+            Actor::Operator,
             submission,
             faceoff_airhockey::RULESET,
             &plan,
@@ -142,7 +142,7 @@ async fn jobs_and_ablations_use_the_stages_variation() {
     assert_eq!(spec.perturbations, Default::default());
     let submission = server.store.evaluation(id).await.unwrap().submission;
     let created = server.store.request_ablation(
-        Actor::Host,
+        Actor::Operator,
         submission,
         faceoff_airhockey::RULESET,
         &plan,

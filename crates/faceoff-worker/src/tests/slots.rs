@@ -148,7 +148,7 @@ async fn error_after_a_cancellation_is_no_platform_fault() {
     let store = server.store.clone();
     // Ends before the lease keeper has noticed that the lease is lost.
     let evaluator = Scripted::new(move |_, _| {
-        let cancelled = store.cancel_evaluation(Actor::Host, id, "a test", clock.now());
+        let cancelled = store.cancel_evaluation(Actor::Operator, id, "a test", clock.now());
         handle.block_on(cancelled).unwrap();
         Err(PlatformFault::Io {
             action: "fetching the bundle".into(),
@@ -375,7 +375,7 @@ async fn ablation_plays_own_episodes_in_all_profiles() {
     server
         .store
         .request_ablation(
-            Actor::Host,
+            Actor::Operator,
             submission,
             faceoff_airhockey::RULESET,
             &plan,

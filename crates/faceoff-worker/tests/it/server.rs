@@ -147,7 +147,7 @@ impl Server {
     /// Starts a day with this plan. Returns the evaluations in the order of the uploads.
     pub async fn start_day(&self, plan: &RunPlan, now: Timestamp) -> Vec<Evaluation> {
         let stage = configure_stage(&self.store, plan, None, now).await;
-        let started = self.store.start_day(Actor::Host, stage, now);
+        let started = self.store.start_day(Actor::Operator, stage, now);
         started.await.unwrap()
     }
 

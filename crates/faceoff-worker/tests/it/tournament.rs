@@ -37,7 +37,7 @@ pub async fn start_round(
         entrants,
     };
     let (store, now) = (&server.store, Timestamp::now());
-    let opened = store.open_tournament(Actor::Host, &new, now);
+    let opened = store.open_tournament(Actor::Operator, &new, now);
     let id = opened.await.unwrap().id;
     let drawn = DrawnRound {
         number: RoundNumber::FIRST,
@@ -47,7 +47,7 @@ pub async fn start_round(
             byes: Vec::new(),
         }],
     };
-    let started = store.start_round(Actor::Host, id, &drawn, now);
+    let started = store.start_round(Actor::Operator, id, &drawn, now);
     started.await.unwrap();
     store.games(id, GameFilter::Rounds).await.unwrap()
 }

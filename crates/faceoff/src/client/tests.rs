@@ -21,7 +21,7 @@ use indicatif::ProgressBar;
 use jiff::Timestamp;
 use tempfile::TempDir;
 
-/// The host's token, which has an organiser's rights.
+/// The operator's token, which has an organiser's rights.
 const ADMIN: &str = "fo_admin_test";
 /// The bundle limit of servers on which nothing is uploaded, or only a bundle that is too large.
 const SMALL_BUNDLE_BYTES: u64 = 64;
@@ -50,7 +50,7 @@ async fn start_site(max_bundle_bytes: u64) -> Site {
     let store = new_store(folder.path()).await;
     assert!(
         store
-            .set_host_token(hash_token(ADMIN), now())
+            .set_operator_token(hash_token(ADMIN), now())
             .await
             .unwrap()
     );

@@ -23,7 +23,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Copies all data of a server into a folder: the database with the season's secret, the artifacts and the host's
+/// Copies all data of a server into a folder: the database with the season's secret, the artifacts and the operator's
 /// token. The server keeps running. The copy is complete or absent, readable by its owner only, and checked: the
 /// database is intact, and every file it refers to exists with the recorded hash. Keep the copy as secret as the
 /// server itself.

@@ -59,7 +59,7 @@ pub(super) fn whoami_text(caller: &CallerView) -> String {
     let of_team = team.map(|team| format!(" of the team {} ({})", team.name, team.id));
     let role = match caller.role.as_str() {
         "team" => "API client",
-        "host" => "host, with the rights of an organiser",
+        "host" => "operator, with the rights of an organiser",
         "organiser" => "organiser",
         role => role,
     };

@@ -27,7 +27,7 @@ use std::{
 };
 use tempfile::TempDir;
 
-/// The host's token, which has an organiser's rights.
+/// The operator's token, which has an organiser's rights.
 const ADMIN: &str = "fo_admin_test";
 /// How long a claimed job is leased.
 const LEASE_SECONDS: u32 = 60;
@@ -73,7 +73,7 @@ async fn start_site() -> Site {
     let store = new_store(folder.path()).await;
     assert!(
         store
-            .set_host_token(hash_token(ADMIN), now())
+            .set_operator_token(hash_token(ADMIN), now())
             .await
             .unwrap()
     );
@@ -157,7 +157,10 @@ async fn run_day(store: &Store) -> EvaluationId {
                     .await
                     .unwrap();
                 let stage = stage.take().unwrap();
-                store.start_day(Actor::Host, stage, now()).await.unwrap();
+                store
+                    .start_day(Actor::Operator, stage, now())
+                    .await
+                    .unwrap();
             }
             Job::Shard { run, shard, .. } => {
                 let outcomes =

@@ -417,7 +417,7 @@ async fn tournament_keeps_its_ruleset_until_its_rules_change() {
     };
     let now = cup.site.now();
     store
-        .change_tournament(Actor::Host, opened.id, &earlier_ruleset, now)
+        .change_tournament(Actor::Operator, opened.id, &earlier_ruleset, now)
         .await
         .unwrap();
     for rules in [

@@ -1,4 +1,4 @@
-//! The token that the organisers' commands use. The *host's token* has all rights of an organiser; the server writes it to its
+//! The token that the organisers' commands use. The *operator's token* has all rights of an organiser; the server writes it to its
 //! data folder when it first starts.
 
 use crate::{
@@ -19,13 +19,13 @@ use std::{
 /// A client with the first token that exists of:
 ///
 /// 1. `token`: that of `--token` or `FACEOFF_ADMIN_TOKEN`,
-/// 2. the host's token in the folder of `--data-dir`,
+/// 2. the operator's token in the folder of `--data-dir`,
 /// 3. the token of `faceoff login` to this server,
-/// 4. the host's token in the configured data folder, if the server runs on this machine.
+/// 4. the operator's token in the configured data folder, if the server runs on this machine.
 ///
 /// Without an option, a variable and a login, the server is the one of this machine that `faceoff.toml` in the working folder configures.
 ///
-/// The host's token is sent to another machine only if `--data-dir` names its folder.
+/// The operator's token is sent to another machine only if `--data-dir` names its folder.
 pub(super) fn admin_client(
     server: Option<&str>,
     token: Option<&str>,
@@ -51,7 +51,7 @@ pub(super) fn admin_client(
             ))
             .into());
         }
-        connection.token = Some(read_host_token(data_dir)?.trim().to_owned());
+        connection.token = Some(read_operator_token(data_dir)?.trim().to_owned());
     }
     connection.client()
 }
@@ -75,8 +75,8 @@ fn is_local(server: &str) -> bool {
     host.is_some_and(|host| is_this_machine(&host))
 }
 
-/// Reads the host's token from the file that the server has created.
-fn read_host_token(data_dir: Option<&Path>) -> anyhow::Result<String> {
+/// Reads the operator's token from the file that the server has created.
+fn read_operator_token(data_dir: Option<&Path>) -> anyhow::Result<String> {
     let data_dir = match data_dir {
         Some(data_dir) => data_dir.to_owned(),
         None => Config::load(None)?.server.data_dir,

@@ -10,7 +10,7 @@ use serde_json::Value;
 
 #[derive(Debug, Args)]
 pub(super) struct LogArgs {
-    /// Only by this actor: organiser (the host), person:ID, team:ID, visitor, schedule, worker:NAME or server;
+    /// Only by this actor: organiser (the operator), person:ID, team:ID, visitor, schedule, worker:NAME or server;
     /// without an id, person, team and worker match all of that kind
     #[arg(long)]
     actor: Option<String>,

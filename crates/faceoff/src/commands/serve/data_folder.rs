@@ -1,5 +1,5 @@
-//! The data folder: its lock and its secrets. The *host* is the person who runs the server; the *host's token* has all rights of
-//! an organiser.
+//! The data folder: its lock and its secrets. The *operator* is the person who runs the server; the *operator's token* has all
+//! rights of an organiser.
 
 use super::super::{
     atomic_folder::create_private,
@@ -20,7 +20,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Name of the file with the host's token.
+/// Name of the file with the operator's token.
 pub const ADMIN_TOKEN_FILE: &str = "admin-token";
 
 /// Name of the file with the key that signs links. Backups do not contain it.
@@ -170,8 +170,8 @@ pub fn empty_folder_except(folder: &Path, kept: &str) -> anyhow::Result<()> {
     emptied.with_context(|| format!("emptying {}", folder.display()))
 }
 
-/// The hash of the host's token, which is created at the first start.
-fn load_or_create_host_token(data_dir: &Path) -> anyhow::Result<[u8; 32]> {
+/// The hash of the operator's token, which is created at the first start.
+fn load_or_create_operator_token(data_dir: &Path) -> anyhow::Result<[u8; 32]> {
     let file = data_dir.join(ADMIN_TOKEN_FILE);
     match fs::read_to_string(&file) {
         Ok(token) if token.trim().is_empty() => bail!(
@@ -182,7 +182,8 @@ fn load_or_create_host_token(data_dir: &Path) -> anyhow::Result<[u8; 32]> {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
         Err(error) => return Err(error).with_context(|| format!("reading {}", file.display())),
     }
-    let token = Secret::generate(SecretKind::Host).context("generating the organiser's token")?;
+    let token =
+        Secret::generate(SecretKind::Operator).context("generating the organiser's token")?;
     write_secret(&file, token.as_str())?;
     tracing::info!(file = %file.display(), "created the organiser's token; keep the file secret");
     Ok(token.hash())
@@ -227,20 +228,20 @@ pub fn load_or_create_link_key(data_dir: &Path) -> anyhow::Result<LinkKey> {
     }
 }
 
-/// Registers the host's token in the store. If the token in the file has been revoked, creates a new one first.
+/// Registers the operator's token in the store. If the token in the file has been revoked, creates a new one first.
 ///
 /// # Errors
 /// If the file or the database cannot be read or written.
 pub async fn set_admin_token(store: &Store, data_dir: &Path, now: Timestamp) -> anyhow::Result<()> {
     if !store
-        .set_host_token(load_or_create_host_token(data_dir)?, now)
+        .set_operator_token(load_or_create_operator_token(data_dir)?, now)
         .await?
     {
         let file = data_dir.join(ADMIN_TOKEN_FILE);
         tracing::warn!(file = %file.display(), "the token in the file was revoked; creating a new one");
         fs::remove_file(&file).with_context(|| format!("removing {}", file.display()))?;
         store
-            .set_host_token(load_or_create_host_token(data_dir)?, now)
+            .set_operator_token(load_or_create_operator_token(data_dir)?, now)
             .await?;
     }
     Ok(())
@@ -305,10 +306,10 @@ mod tests {
     }
 
     #[test]
-    fn host_token_is_created_once_and_private() {
+    fn operator_token_is_created_once_and_private() {
         let folder = tempfile::tempdir().unwrap();
-        let first = load_or_create_host_token(folder.path()).unwrap();
-        assert_eq!(load_or_create_host_token(folder.path()).unwrap(), first);
+        let first = load_or_create_operator_token(folder.path()).unwrap();
+        assert_eq!(load_or_create_operator_token(folder.path()).unwrap(), first);
         let file = folder.path().join(ADMIN_TOKEN_FILE);
         assert_eq!(file.metadata().unwrap().permissions().mode() & 0o777, 0o600);
         let token = fs::read_to_string(&file).unwrap();
@@ -316,7 +317,7 @@ mod tests {
         assert_eq!(hash_token(token.trim()), first);
         fs::write(&file, "\n").unwrap();
         assert!(
-            load_or_create_host_token(folder.path()).is_err(),
+            load_or_create_operator_token(folder.path()).is_err(),
             "an empty token must not be accepted"
         );
     }

@@ -197,7 +197,7 @@ async fn shorten_due_times(config: &Config, store: &Store, now: Timestamp) -> an
 async fn configure_season(config: &Config, store: &Store, now: Timestamp) -> anyhow::Result<()> {
     if let Some(name) = &config.season.name {
         store
-            .name_season(Actor::Host, name, now)
+            .name_season(Actor::Operator, name, now)
             .await
             .context("naming the season")?;
     }
