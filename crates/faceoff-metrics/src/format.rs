@@ -78,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn format_is_the_one_that_is_asked_for() {
+    fn format_follows_the_accept_header() {
         // As Prometheus asks.
         let both =
             "application/openmetrics-text;version=1.0.0;q=0.5,text/plain;version=0.0.4;q=0.4";
@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn types_are_those_of_the_text_format() {
+    fn prometheus_text_has_prometheus_names_and_types() {
         let open_metrics = "# HELP a_build Version.\n# TYPE a_build info\na_build_info{version=\"1\"} 1\n\
                             # HELP a_wait_seconds Wait.\n# TYPE a_wait_seconds gauge\n# UNIT a_wait_seconds seconds\n\
                             a_wait_seconds 0.5\n# HELP a_events All events.\n# TYPE a_events counter\na_events_total 3\n# EOF\n";

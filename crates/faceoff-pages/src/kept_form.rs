@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn ids_and_versions_are_not_typed() {
+    fn id_and_version_fields_are_hidden() {
         let field = |(name, value): (&str, &str)| KeptField {
             name: name.to_owned(),
             value: value.to_owned(),
@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn sign_in_page_gives_the_form_back() {
+    fn kept_form_round_trips_and_foreign_paths_are_refused() {
         let typed = [
             ("next", "mine"),
             ("form", "A"),

@@ -151,7 +151,7 @@ async fn ablation_is_no_evaluation_but_is_linked_from_it() {
     let board = site.get("/api/v1/board", None).await.json(200);
     assert_eq!(board["rows"], json!([]));
     let submission = api.replace("/ablation", "");
-    let evaluation = site.evaluate(&team, &submission).await;
+    let evaluation = site.start_evaluation(&team, &submission).await;
     let evaluation_page = site.get(&evaluation.replace("/api/v1", ""), None).await;
     assert!(evaluation_page.body.contains(&format!("href=\"{page}\"")));
 }

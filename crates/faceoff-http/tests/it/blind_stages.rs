@@ -16,8 +16,8 @@ async fn blind_day(site: &Site) -> ([TestTeam; 2], [String; 2]) {
         .json(200);
     assert_eq!(blind["blind"], true);
     let paths = [
-        site.evaluate(&teams[0], &submissions[0]).await,
-        site.evaluate(&teams[1], &submissions[1]).await,
+        site.start_evaluation(&teams[0], &submissions[0]).await,
+        site.start_evaluation(&teams[1], &submissions[1]).await,
     ];
     (teams, paths)
 }

@@ -24,7 +24,7 @@ const TEAMS: [(&str, [f64; 3], f64); 5] = [
 async fn site_with_results() -> Site {
     let site = Site::start().await;
     let teams = TEAMS.map(|(name, rates, points)| (name, result(rates, points)));
-    site.ranked_teams(&teams).await;
+    site.add_ranked_teams(&teams).await;
     site
 }
 

@@ -205,7 +205,7 @@ async fn full_board_page_loads_less_than_100_kilobytes() {
         .zip(&results)
         .map(|(name, result)| (name.as_str(), result.clone()))
         .collect();
-    site.ranked_teams(&teams).await;
+    site.add_ranked_teams(&teams).await;
     site.next_day();
     site.start_day().await;
     for result in results.iter().rev() {

@@ -85,7 +85,7 @@ async fn forecast_reports_a_day_that_will_not_fit() {
     .await
     .json(200);
 
-    site.evaluate(&alpha, &submission).await;
+    site.start_evaluation(&alpha, &submission).await;
     run_evaluation_slowly(&site, 300).await;
     site.next_day();
     site.change_stage(
@@ -113,7 +113,7 @@ async fn forecast_reports_a_day_that_will_not_fit() {
     }
 
     // Once the day has started, the remaining episodes are compared with the remaining time.
-    let evaluation = site.evaluate(&alpha, &submission).await;
+    let evaluation = site.start_evaluation(&alpha, &submission).await;
     site.advance(1800);
     let days = capacity().await["days"].clone();
     assert_eq!(days.as_array().unwrap().len(), 2);
@@ -198,8 +198,8 @@ async fn pending_jobs_show_position_time_and_next_step() {
     let me = site.get("/api/v1/me", Some(&alpha.token)).await.json(200);
     assert_eq!(me["validating"], json!([]));
 
-    let alpha_evaluation = site.evaluate(&alpha, &submissions[0]).await;
-    let beta_evaluation = site.evaluate(&beta, &submissions[1]).await;
+    let alpha_evaluation = site.start_evaluation(&alpha, &submissions[0]).await;
+    let beta_evaluation = site.start_evaluation(&beta, &submissions[1]).await;
     run_evaluation_slowly(&site, 60).await;
     let mut pending = Vec::new();
     for (team, path) in [(&alpha, &alpha_evaluation), (&beta, &beta_evaluation)] {
@@ -315,7 +315,7 @@ async fn monitor_warns_once_of_each_day_that_does_not_fit() {
     );
 
     set_episodes(4).await;
-    site.evaluate(&alpha, &submission).await;
+    site.start_evaluation(&alpha, &submission).await;
     run_evaluation_slowly(&site, 300).await;
     site.next_day();
     assert_eq!(monitor.check().await.unwrap(), [], "12 episodes fit");
@@ -357,7 +357,7 @@ async fn monitor_warns_once_of_each_day_that_does_not_fit() {
     assert!(!page(None).await.contains("id=\"capacity\""));
 
     // After the cutoff the day is reported again, and the following day for the first time.
-    site.evaluate(&alpha, &submission).await;
+    site.start_evaluation(&alpha, &submission).await;
     let warnings = monitor.check().await.unwrap();
     let expected = [
         ("2026-03-02".to_owned(), true),

@@ -63,7 +63,7 @@ async fn overfull_day_is_logged_once_and_again_at_its_cutoff() {
     let alpha = site.team("Alpha").await;
     let stage = site.stage().await.to_string();
     let submission = site.valid_submission(&alpha, "a").await;
-    site.evaluate(&alpha, &submission).await;
+    site.start_evaluation(&alpha, &submission).await;
     run_evaluation_slowly(&site, 300).await;
     site.next_day();
     let rules = json!({ "episodes_per_task": 1000, "day_deadline": { "hours": 1 }, "confirm": "Qualifying" });
@@ -78,7 +78,7 @@ async fn overfull_day_is_logged_once_and_again_at_its_cutoff() {
     let monitor = tokio::spawn(site.capacity_monitor().run(shutdown));
     warnings.wait_for(1).await;
     // The cutoff triggers a check: it warns of the started day and of the next one.
-    site.evaluate(&alpha, &submission).await;
+    site.start_evaluation(&alpha, &submission).await;
     warnings.wait_for(3).await;
     drop(shutdown_sender);
     monitor.await.unwrap();

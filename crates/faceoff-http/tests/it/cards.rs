@@ -119,7 +119,7 @@ async fn blind_results_are_on_no_card() {
     site.change_first_stage(json!({ "blind": true }))
         .await
         .json(200);
-    let evaluation = site.evaluate(&alpha, &submission).await;
+    let evaluation = site.start_evaluation(&alpha, &submission).await;
     let pages = pages(&alpha, &evaluation);
     let before = cards(&site, &pages, None).await;
     site.finish_evaluation(&result([0.511, 0.622, 0.733], 777.5))
@@ -144,13 +144,13 @@ async fn results_after_a_freeze_are_on_no_card() {
     let site = Site::start().await;
     let alpha = site.team("Alpha").await;
     let submission = site.valid_submission(&alpha, "agent").await;
-    site.evaluate(&alpha, &submission).await;
+    site.start_evaluation(&alpha, &submission).await;
     site.finish_evaluation(&result([0.5; 3], 10.0)).await;
     let freeze = format!("/api/v1/stages/{}/freeze", site.stage().await);
     let reason = json!({ "reason": "a surprise" });
     site.post(&freeze, Some(ADMIN), &reason).await.json(200);
     site.next_day();
-    let evaluation = site.evaluate(&alpha, &submission).await;
+    let evaluation = site.start_evaluation(&alpha, &submission).await;
     let pages = pages(&alpha, &evaluation);
     let before = cards(&site, &pages, None).await;
     site.finish_evaluation(&result([1.0; 3], 20.0)).await;

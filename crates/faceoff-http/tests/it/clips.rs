@@ -90,7 +90,7 @@ async fn record_day_on(site: Site, is_over: bool) -> RecordedDay {
     let [alpha, beta] = [site.team("Alpha").await, site.team("Beta").await];
     let alpha_submission = site.valid_submission(&alpha, "striker").await;
     site.valid_submission(&beta, "striker").await;
-    let path = site.evaluate(&alpha, &alpha_submission).await;
+    let path = site.start_evaluation(&alpha, &alpha_submission).await;
     let id = path.rsplit('/').next().unwrap().to_owned();
     let folder = tempfile::tempdir().unwrap();
     let pack = record_clips(folder.path());

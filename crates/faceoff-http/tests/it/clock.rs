@@ -187,7 +187,7 @@ async fn future_day_is_told_and_can_be_voided() {
     let site = Site::start_with_schedule("06:00").await;
     // The clock was five days ahead for a minute, with an earlier version or because an organiser accepted it.
     site.advance(5 * 86_400);
-    site.ranked_teams(&[("Alpha", result([0.9; 3], 10.0))])
+    site.add_ranked_teams(&[("Alpha", result([0.9; 3], 10.0))])
         .await;
     site.advance(-5 * 86_400);
     let mut grace = grace(&site).await;

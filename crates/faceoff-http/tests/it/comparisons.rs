@@ -156,7 +156,7 @@ async fn unpaired_evaluations_are_refused_with_the_field() {
     let queued = {
         let team = site.team("Queued").await;
         let submission = site.valid_submission(&team, "q").await;
-        let path = site.evaluate(&team, &submission).await;
+        let path = site.start_evaluation(&team, &submission).await;
         path.rsplit('/').next().unwrap().parse().unwrap()
     };
     let refused = site.get(&comparison_path(a, tomorrow), None).await;

@@ -84,7 +84,7 @@ async fn voided_day_voids_or_cancels_all_its_evaluations() {
     let (alpha, beta) = (site.team("Alpha").await, site.team("Beta").await);
     let submission = site.valid_submission(&alpha, "a").await;
     site.valid_submission(&beta, "b").await;
-    site.evaluate(&alpha, &submission).await;
+    site.start_evaluation(&alpha, &submission).await;
     site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
         .await;
     let stage = site.stage().await;
@@ -125,7 +125,7 @@ async fn disqualified_team_leaves_the_board_with_the_reason() {
     site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
         .await;
     site.next_day();
-    let running = site.evaluate(&team, &submission).await;
+    let running = site.start_evaluation(&team, &submission).await;
     let path = format!("/api/v1/teams/{}/disqualify", team.id);
     let view = confirm_decision(
         &site,

@@ -9,7 +9,7 @@ const REASON: &str = "the last week is a surprise";
 #[tokio::test]
 async fn frozen_board_hides_later_results_from_the_public() {
     let site = Site::start().await;
-    site.ranked_teams(&[("Alpha", result([0.5, 0.5, 0.5], 10.0))])
+    site.add_ranked_teams(&[("Alpha", result([0.5, 0.5, 0.5], 10.0))])
         .await;
     let board_before_freeze = site.get("/api/v1/board", None).await.json(200);
     let stage = site.stage().await;
@@ -148,7 +148,7 @@ async fn frozen_board_hides_later_results_from_the_public() {
 #[tokio::test]
 async fn missed_day_is_evaluated_later_with_a_public_reason() {
     let site = Site::start().await;
-    site.ranked_teams(&[("Alpha", result([0.5, 0.5, 0.5], 10.0))])
+    site.add_ranked_teams(&[("Alpha", result([0.5, 0.5, 0.5], 10.0))])
         .await;
     let stage = site.stage().await;
     let path = format!("/api/v1/stages/{stage}/days");
@@ -239,7 +239,7 @@ async fn missed_day_is_evaluated_later_with_a_public_reason() {
 #[tokio::test]
 async fn extra_evaluation_is_confirmed_when_it_replaces_one() {
     let site = Site::start().await;
-    site.ranked_teams(&[("Alpha", result([0.5, 0.5, 0.5], 10.0))])
+    site.add_ranked_teams(&[("Alpha", result([0.5, 0.5, 0.5], 10.0))])
         .await;
     let stage = site.stage().await;
     let path = format!("/api/v1/stages/{stage}/days/2026-03-01/extra-evaluation");

@@ -22,7 +22,7 @@ async fn season_with_divisions() -> Site {
         ("C", result([0.3, 0.3, 0.3], 30.0)),
         ("D", result([0.1, 0.1, 0.1], 40.0)),
     ];
-    site.ranked_teams(&teams).await;
+    site.add_ranked_teams(&teams).await;
     let divisions = json!({ "divisions": ["Open", "Bachelor students"] });
     patch(&site, "/season", &divisions).await;
     for (name, division) in [
@@ -102,7 +102,7 @@ async fn divisions_keep_their_order_and_teams() {
 async fn board_without_divisions_is_unchanged() {
     let site = Site::start().await;
     let alpha = [("Alpha", result([0.9, 0.9, 0.9], 10.0))];
-    site.ranked_teams(&alpha).await;
+    site.add_ranked_teams(&alpha).await;
     let board = site.get("/api/v1/board", None).await.json(200);
     assert_eq!(places(&board), [(1, 1, "Alpha".to_owned())]);
     assert!(!board.to_string().contains("division"), "{board}");

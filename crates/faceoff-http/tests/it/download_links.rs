@@ -11,7 +11,7 @@ use serde_json::json;
 async fn finished_evaluation(site: &Site, name: &str) -> (TestTeam, String, String) {
     let team = site.team(name).await;
     let submission = site.valid_submission(&team, "striker").await;
-    let path = site.evaluate(&team, &submission).await;
+    let path = site.start_evaluation(&team, &submission).await;
     site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
         .await;
     (team, path, submission)

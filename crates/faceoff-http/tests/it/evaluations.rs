@@ -98,9 +98,9 @@ async fn single_evaluation_cannot_be_started() {
         site.get("/api/v1/evaluations", Some(ADMIN)).await.json(200),
         json!([])
     );
-    site.evaluate(&team, &submission).await;
+    site.start_evaluation(&team, &submission).await;
     site.next_day();
-    site.evaluate(&team, &submission).await;
+    site.start_evaluation(&team, &submission).await;
     let team_evaluations = site
         .get("/api/v1/evaluations", Some(&team.token))
         .await
@@ -239,7 +239,7 @@ async fn evaluation_of_another_team_is_not_found() {
     let site = Site::start().await;
     let (owner, other) = (site.team("Owner").await, site.team("Other").await);
     let submission = site.valid_submission(&owner, "striker").await;
-    let path = site.evaluate(&owner, &submission).await;
+    let path = site.start_evaluation(&owner, &submission).await;
     site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
         .await;
     let dataset = format!("{path}/dataset");

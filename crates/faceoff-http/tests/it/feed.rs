@@ -32,7 +32,7 @@ async fn feed_lists_news_newest_first_with_stable_ids() {
     assert_eq!(first_feed.title().as_str(), "Test season · Faceoff");
     assert_eq!(titles(&first_feed), ["Qualifying is open"]);
     site.advance(60);
-    site.ranked_teams(&[
+    site.add_ranked_teams(&[
         ("Alpha", result([0.511; 3], 10.0)),
         ("Beta", result([0.7; 3], 20.0)),
     ])

@@ -13,7 +13,7 @@ async fn frozen_stage(site: &Site) -> ([TestTeam; 2], [String; 3]) {
         .await
         .json(200);
     let alpha_submission = site.valid_submission(&teams[0], "a").await;
-    let before = site.evaluate(&teams[0], &alpha_submission).await;
+    let before = site.start_evaluation(&teams[0], &alpha_submission).await;
     site.finish_evaluation(&result([0.5, 0.5, 0.5], 10.0)).await;
     let freeze = format!("/api/v1/stages/{}/freeze", site.stage().await);
     site.post(&freeze, Some(ADMIN), &json!({ "reason": REASON }))
@@ -21,8 +21,8 @@ async fn frozen_stage(site: &Site) -> ([TestTeam; 2], [String; 3]) {
         .json(200);
     site.next_day();
     let beta_submission = site.valid_submission(&teams[1], "b").await;
-    let after = site.evaluate(&teams[0], &alpha_submission).await;
-    let beta_after = site.evaluate(&teams[1], &beta_submission).await;
+    let after = site.start_evaluation(&teams[0], &alpha_submission).await;
+    let beta_after = site.start_evaluation(&teams[1], &beta_submission).await;
     site.finish_evaluation(&result([1.0, 1.0, 1.0], 20.0)).await;
     site.finish_evaluation(&result([0.7, 0.7, 0.7], 30.0)).await;
     (teams, [before, after, beta_after])

@@ -96,7 +96,7 @@ async fn organiser_dashboard_is_for_organisers_only() {
 #[tokio::test]
 async fn evaluation_is_voided_with_a_reason_and_rerun() {
     let site = Site::start().await;
-    site.ranked_teams(&[("Alpha", result([0.9; 3], 10.0))])
+    site.add_ranked_teams(&[("Alpha", result([0.9; 3], 10.0))])
         .await;
     let mut grace = grace(&site).await;
     let (link, page) = open_decision(&mut grace, "/organiser/day", "void/").await;
@@ -590,7 +590,7 @@ async fn question_is_asked_by_a_team_and_answered_by_an_organiser() {
 #[tokio::test]
 async fn organiser_forms_refuse_foreign_origins() {
     let site = Site::start().await;
-    site.ranked_teams(&[("Alpha", result([0.9; 3], 10.0))])
+    site.add_ranked_teams(&[("Alpha", result([0.9; 3], 10.0))])
         .await;
     let mut grace = grace(&site).await;
     let stage = string(&site.get("/api/v1/stages", None).await.json(200)[0]["id"]);

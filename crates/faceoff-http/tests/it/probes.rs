@@ -34,7 +34,7 @@ async fn server_that_is_not_ready_is_live() {
 }
 
 #[tokio::test]
-async fn stalled_slot_is_named() {
+async fn readiness_problem_names_stuck_slot() {
     let site = Site::start().await;
     let slots = site.metrics().slots();
     site.get("/readyz", None).await.json(200);
@@ -103,7 +103,7 @@ async fn metrics_follow_events() {
 
     assert_eq!(metric(&before, "faceoff_queue_expected_seconds"), 0.0);
     let submission = site.valid_submission(&team, "striker").await;
-    site.evaluate(&team, &submission).await;
+    site.start_evaluation(&team, &submission).await;
     site.advance(90);
     let during = metrics().await;
     // No job of this kind has run before, so its duration is unknown.

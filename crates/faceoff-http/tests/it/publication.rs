@@ -13,7 +13,7 @@ async fn unfinished_day(site: &Site, publishes: &str) -> ([TestTeam; 2], String)
     site.valid_submission(&teams[1], "b").await;
     let settings = json!({ "publishes": publishes, "closes_at": CLOSES_AT });
     site.change_first_stage(settings).await.json(200);
-    let path = site.evaluate(&teams[0], &submission).await;
+    let path = site.start_evaluation(&teams[0], &submission).await;
     site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
         .await;
     (teams, path)
@@ -151,7 +151,7 @@ async fn published_failure_hides_faults_and_log() {
     site.change_first_stage(json!({ "publishes": "at_release" }))
         .await
         .json(200);
-    let path = site.evaluate(&team, &submission).await;
+    let path = site.start_evaluation(&team, &submission).await;
     site.run_shards(2).await;
     let team_view = site.get(&path, Some(&team.token)).await.json(200);
     assert!(team_view["log"].as_str().unwrap().contains("log of"));

@@ -49,7 +49,7 @@ async fn rate_limit_applies_per_address() {
         address: limit_with_burst(5),
         ..RateLimits::default()
     };
-    let site = Site::start().await.with_rates(rates).await;
+    let site = Site::start().await.with_rate_limits(rates).await;
     // The server trusts the test's loopback address as a proxy.
     let refused = request_until_refused(&site, None, Some("192.0.2.1")).await;
     let problem = refused.problem(429, "too-many-requests", &["5 at once", "wait"]);
@@ -76,7 +76,7 @@ async fn signed_in_callers_share_no_rate_limit_of_an_address() {
         address: limit_with_burst(5),
         ..RateLimits::default()
     };
-    let site = site.with_rates(rates).await;
+    let site = site.with_rate_limits(rates).await;
     let status = async |token: Option<&str>| {
         let request = site.request(Method::GET, "/api/v1/me", token);
         let request = request.header("x-forwarded-for", "192.0.2.1");
@@ -103,7 +103,7 @@ async fn rate_limit_applies_per_token() {
         token: limit_with_burst(5),
         ..RateLimits::default()
     };
-    let site = site.with_rates(rates).await;
+    let site = site.with_rate_limits(rates).await;
     let refused = request_until_refused(&site, Some(&alpha.token), None).await;
     refused.problem(429, "too-many-requests", &["a token", "5 at once"]);
     site.get("/api/v1/season", Some(&beta.token))
@@ -118,7 +118,7 @@ async fn search_and_card_count_as_several_requests() {
         address: limit_with_burst(1000),
         ..RateLimits::default()
     };
-    let site = Site::start().await.with_rates(rates).await;
+    let site = Site::start().await.with_rate_limits(rates).await;
     for (path, address, least) in [
         ("/docs/search?q=puck", "192.0.2.1", 100),
         ("/card.png", "192.0.2.2", 200),
@@ -144,14 +144,14 @@ async fn search_and_card_count_as_several_requests() {
 }
 
 #[tokio::test]
-async fn team_has_a_daily_quota_of_changes() {
+async fn token_may_use_half_of_the_daily_change_quota() {
     let site = Site::start().await;
     let [alpha, beta] = [site.team("Alpha").await, site.team("Beta").await];
     let rates = RateLimits {
         team_changes_per_day: NonZeroU32::new(6),
         ..RateLimits::default()
     };
-    let site = site.with_rates(rates).await;
+    let site = site.with_rate_limits(rates).await;
     let ask = async |token: &str| {
         let question = json!({ "text": "When does the stage end?" });
         site.post("/api/v1/questions", Some(token), &question).await
@@ -167,6 +167,7 @@ async fn team_has_a_daily_quota_of_changes() {
         .await;
     assert_eq!(invalid.status, 422);
     assert_eq!(ask(&alpha.token).await.status, 201);
+    // One token may use half of its team's quota: 3 of 6 changes.
     let refused = ask(&alpha.token).await;
     let problem = refused.problem(
         429,

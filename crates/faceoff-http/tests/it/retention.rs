@@ -12,7 +12,7 @@ async fn stage_view(site: &Site) -> Value {
 
 /// Runs an evaluation day with this submission. Returns the API path of its evaluation. The clock is then on the next day.
 async fn run_day(site: &Site, team: &TestTeam, submission: &str, rates: [f64; 3]) -> String {
-    let evaluation = site.evaluate(team, submission).await;
+    let evaluation = site.start_evaluation(team, submission).await;
     site.finish_evaluation(&result(rates, 10.0)).await;
     site.next_day();
     evaluation

@@ -313,7 +313,7 @@ impl RoleFixture {
             found.unwrap().1.clone()
         };
         let submission = site.valid_submission(&alpha, "a").await;
-        let evaluation = site.evaluate(&alpha, &submission).await;
+        let evaluation = site.start_evaluation(&alpha, &submission).await;
         site.finish_evaluation(&crate::site::result([0.5; 3], 10.0))
             .await;
         let game = played_test_game(&site, &alpha).await;

@@ -93,7 +93,7 @@ async fn season_page_explains_how_to_verify_seeds() {
     let (early, late) = (site.team("Early").await, site.team("Late").await);
     let submission = site.valid_submission(&early, "e").await;
     site.valid_submission(&late, "l").await;
-    site.evaluate(&early, &submission).await;
+    site.start_evaluation(&early, &submission).await;
     site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
         .await;
     let season: Value = site.get("/api/v1/season", None).await.json(200);

@@ -53,8 +53,8 @@ async fn seed_and_dataset_stay_secret_until_the_day_ends() {
         site.valid_submission(&teams[1], "s").await,
     ];
     let [first, second] = &teams;
-    let first_evaluation = site.evaluate(first, &submissions[0]).await;
-    let second_evaluation = site.evaluate(second, &submissions[1]).await;
+    let first_evaluation = site.start_evaluation(first, &submissions[0]).await;
+    let second_evaluation = site.start_evaluation(second, &submissions[1]).await;
     let secret = site.store.season().await.unwrap().secret;
     let today = jiff::civil::date(2026, 3, 1);
     let seed = secret.stage(site.stage().await).day(today);
@@ -111,7 +111,7 @@ async fn seed_and_dataset_stay_secret_until_the_day_ends() {
         .await
         .problem(409, "cutoff-passed", &["2026-03-02"]);
     site.next_day();
-    site.evaluate(&late, &submission).await;
+    site.start_evaluation(&late, &submission).await;
     let next_seed = secret
         .stage(site.stage().await)
         .day(today.tomorrow().unwrap())
@@ -134,7 +134,7 @@ async fn start_evaluations(site: &Site, names: [&str; 3]) -> (Vec<TestTeam>, Vec
         teams.push(team);
     }
     for (team, submission) in teams.iter().zip(&submissions) {
-        paths.push(site.evaluate(team, submission).await);
+        paths.push(site.start_evaluation(team, submission).await);
     }
     (teams, paths)
 }

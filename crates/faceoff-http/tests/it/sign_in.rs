@@ -376,7 +376,7 @@ async fn hidden_fields_of_a_kept_form_stay_hidden() {
 }
 
 #[tokio::test]
-async fn failing_database_is_no_expired_session() {
+async fn database_failure_shows_the_form_and_no_sign_in() {
     let site = Site::start().await;
     let role = json!({ "role": "organiser", "note": "Grace" });
     let mut grace = Browser::join(&site, "Grace", role).await;

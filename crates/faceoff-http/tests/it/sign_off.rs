@@ -9,7 +9,7 @@ async fn signed_off_stage_does_not_change() {
     let (alpha, beta) = (site.team("Alpha").await, site.team("Beta").await);
     let submission = site.valid_submission(&alpha, "a").await;
     site.valid_submission(&beta, "b").await;
-    let path = site.evaluate(&alpha, &submission).await;
+    let path = site.start_evaluation(&alpha, &submission).await;
     let stage = site.stage().await.to_string();
     let sign_off_path = format!("/api/v1/stages/{stage}/finalise");
     let post_sign_off = async |body: Value| site.post(&sign_off_path, Some(ADMIN), &body).await;

@@ -66,7 +66,7 @@ pub struct Site {
     config: HttpConfig,
     /// The time of the server's clock.
     now: Arc<Mutex<Timestamp>>,
-    /// By how much the system clock is set, for [`with_steady_clock`](Self::with_steady_clock).
+    /// How far the system clock is ahead of the right time, for [`with_steady_clock`](Self::with_steady_clock).
     system_ahead: Arc<Mutex<SignedDuration>>,
     http: reqwest::Client,
     server: JoinHandle<()>,
@@ -250,14 +250,14 @@ impl Site {
     }
 
     /// Restarts the server with these rate limits.
-    pub async fn with_rates(mut self, rates: RateLimits) -> Self {
+    pub async fn with_rate_limits(mut self, rates: RateLimits) -> Self {
         self.config.rate_limits = rates;
         self.restart().await;
         self
     }
 
-    /// Restarts the server with a clock that compares the system clock with a monotonic clock. [`advance`](Self::advance) is
-    /// the time that passes, [`set_system_clock`](Self::set_system_clock) a step.
+    /// Restarts the server with a clock that compares the system clock with a monotonic clock.
+    /// [`advance`](Self::advance) moves both clocks, [`set_system_clock`](Self::set_system_clock) only the system clock.
     pub async fn with_steady_clock(mut self, start: ClockStart) -> Self {
         let (system, monotonic) = (Arc::clone(&self.now), Arc::clone(&self.now));
         let ahead = Arc::clone(&self.system_ahead);
@@ -605,7 +605,7 @@ impl Site {
 
     /// Starts the evaluation day with the active submissions of all teams, unless it has started. Returns the API path of the
     /// team's evaluation, which must be of `submission`.
-    pub async fn evaluate(&self, team: &TestTeam, submission: &str) -> String {
+    pub async fn start_evaluation(&self, team: &TestTeam, submission: &str) -> String {
         match self
             .store
             .start_day(Actor::Operator, self.stage().await, self.now())
@@ -628,7 +628,7 @@ impl Site {
     ) -> (TestTeam, String, String) {
         let team = self.team(name).await;
         let submission = self.valid_submission(&team, agent_name).await;
-        let evaluation = self.evaluate(&team, &submission).await;
+        let evaluation = self.start_evaluation(&team, &submission).await;
         (team, submission, evaluation)
     }
 
@@ -741,7 +741,7 @@ impl Site {
     }
 
     /// Adds these teams, and evaluates a day with these results.
-    pub async fn ranked_teams(&self, teams: &[(&str, EvaluationResult)]) {
+    pub async fn add_ranked_teams(&self, teams: &[(&str, EvaluationResult)]) {
         for (name, _) in teams {
             let team = self.team(name).await;
             self.valid_submission(&team, &format!("{name}-agent")).await;

@@ -13,7 +13,7 @@ async fn change_stage(site: &Site, stage: &Value, body: Value) -> Answer {
 }
 
 #[tokio::test]
-async fn stage_is_created_changed_and_played() {
+async fn stage_is_created_changed_and_evaluated() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     site.valid_submission(&team, "a").await;

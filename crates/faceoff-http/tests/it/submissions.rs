@@ -137,7 +137,7 @@ async fn newest_valid_submission_is_active_until_another_is_chosen() {
         .await;
     assert_eq!(activated.json(200)["active"], true);
     assert_eq!(active().await, first);
-    let evaluation = site.evaluate(&team, &first).await;
+    let evaluation = site.start_evaluation(&team, &first).await;
     // An activation after the cutoff applies to the next cutoff.
     site.advance(1);
     site.post(&activate, token, &json!({})).await.json(200);

@@ -498,7 +498,7 @@ async fn dashboard_lists_evaluations_with_their_files() {
 #[tokio::test]
 async fn dashboard_shows_rank_tasks_and_next_cutoff() {
     let site = Site::start_with_schedule("12:00").await;
-    site.ranked_teams(&[
+    site.add_ranked_teams(&[
         ("Alpha", result([0.9; 3], 10.0)),
         ("Beta", result([0.5, 0.25, 0.0], 10.0)),
     ])

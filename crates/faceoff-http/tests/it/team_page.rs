@@ -109,7 +109,7 @@ async fn submissions_are_shown_to_the_team_and_organisers_only() {
 }
 
 #[tokio::test]
-async fn team_page_without_result_and_of_an_unknown_team() {
+async fn team_without_result_has_no_chart_and_unknown_is_404() {
     let site = Site::start().await;
     let team = site.team("Gamma").await;
     let html = page(&site, &format!("/teams/{}", team.id)).await;

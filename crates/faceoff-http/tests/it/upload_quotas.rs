@@ -77,7 +77,7 @@ async fn concurrent_uploads_are_limited_per_team() {
 }
 
 #[tokio::test]
-async fn interrupted_upload_leaves_no_file_and_frees_its_slot() {
+async fn interrupted_upload_leaves_no_file_and_is_not_counted() {
     let site = Site::start_with(HttpLimits {
         team_uploads: 1,
         ..generous_limits()

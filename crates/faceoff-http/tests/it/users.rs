@@ -392,7 +392,7 @@ async fn session_cookie_is_bound_to_its_host_over_tls() {
 }
 
 #[tokio::test]
-async fn sign_in_without_tls_says_where_it_works() {
+async fn sign_in_over_plain_http_is_refused_with_https_url() {
     let site = Site::start().await;
     let alpha = site.team("Alpha").await;
     member(&site, &alpha.id, "Ada").await;

@@ -76,7 +76,7 @@ async fn webhook_gets_the_events_visible_to_its_owner() {
     .await;
     let alpha_submission = site.valid_submission(&alpha, "a").await;
     site.valid_submission(&beta, "b").await;
-    site.evaluate(&alpha, &alpha_submission).await;
+    site.start_evaluation(&alpha, &alpha_submission).await;
     site.finish_evaluation(&result([0.511; 3], 777.5)).await;
     site.finish_evaluation(&result([0.7; 3], 20.0)).await;
     deliver(&site).await;

@@ -26,7 +26,7 @@ async fn site_with_results() -> Site {
         ("Reckless", without_tier([0.9; 3], 5000.0)),
         ("Same", without_tier([0.4; 3], 10.0)),
     ];
-    site.ranked_teams(&teams).await;
+    site.add_ranked_teams(&teams).await;
     site
 }
 

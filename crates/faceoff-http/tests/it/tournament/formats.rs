@@ -210,7 +210,7 @@ async fn mirrored_meeting_is_two_games_with_the_same_seed() {
 #[tokio::test]
 async fn default_entrants_are_ranked_and_deployable_or_improvable() {
     let site = Site::start().await;
-    site.ranked_teams(&[
+    site.add_ranked_teams(&[
         ("Deployable", result([0.5; 3], 10.0)),
         ("Improvable", result([0.5; 3], 900.0)),
         ("Unsafe", result([0.9; 3], 2000.0)),

@@ -64,7 +64,7 @@ fn ranking_is_title_then_heading_then_text() {
 }
 
 #[test]
-fn title_of_the_page_counts_as_context_only() {
+fn page_title_alone_is_no_match_of_later_sections() {
     let on_page = |heading: &str, text: &str| Section {
         page: "Backup".into(),
         ..section(heading, text)
