@@ -10,8 +10,8 @@ use tokio::sync::watch;
 /// Number of finished games that are kept, so that late viewers still see their end.
 const MAX_FINISHED_LIVE_GAMES: usize = 32;
 
-/// The games that this process's slots play, and the last finished ones. Cloning is cheap. Updating a game never waits for
-/// its viewers.
+/// The games that the server's own slots and remote workers play, and the last finished ones. Cloning is cheap. Updating a
+/// game never waits for its viewers.
 #[derive(Debug, Clone, Default)]
 pub struct LiveGames {
     /// In the order in which they were last started.
@@ -109,7 +109,8 @@ impl LiveGames {
         });
     }
 
-    /// Subscribes to a game. `None` if no slot of this process has started it, or if it was forgotten since its end.
+    /// Subscribes to a game. `None` if no slot of this server or of a remote worker has started it, or if it was forgotten
+    /// since its end.
     #[must_use]
     pub fn subscribe(&self, game: GameId) -> Option<LiveSubscription> {
         let channel = self.find(game)?;

@@ -1,4 +1,4 @@
-//! Declaration of a metric: its name, its help text and its type, at the place where its owner keeps it.
+//! Creates a metric and registers it with its name and help text. The caller stores the returned clone.
 
 use prometheus_client::registry::{Metric, Registry, Unit};
 

@@ -15,7 +15,7 @@ pub struct GaugeValues {
     /// Result of the latest write test.
     pub database_writable: bool,
     pub queue: Queue,
-    /// How far the system clock was set and is ahead, seconds; negative: behind; 0 if it was not set.
+    /// By how many seconds the system clock is ahead since it was set; negative: behind; 0 if it was not set.
     pub clock_step_s: f64,
     /// Evaluations that are queued or running.
     pub open_evaluations: u32,
@@ -45,7 +45,8 @@ pub struct Queue {
     pub paused: bool,
     /// Waiting time of the oldest waiting job, seconds; 0 if none is waiting.
     pub oldest_wait_s: f64,
-    /// Expected time until everything that counts is done with the current slots, seconds; NaN if unknown.
+    /// Expected time until all open validation runs, and all open evaluations and games that count, have ended on the current
+    /// slots, seconds; NaN if unknown.
     pub expected_s: f64,
 }
 
@@ -114,13 +115,13 @@ const GAUGES: [Gauge; 16] = [
     },
     Gauge {
         name: "queue_expected",
-        help: "Expected time until everything that counts is done with the current slots; NaN if it was never measured, or the queue is paused",
+        help: "Expected time until all open validation runs, and all open evaluations and games that count, have ended on the current slots; NaN if it was never measured, or the queue is paused",
         unit: Some(Unit::Seconds),
         read: |values| Seconds(values.queue.expected_s),
     },
     Gauge {
         name: "clock_step",
-        help: "How far the system clock was set and is ahead (negative: behind); 0 if it was not set",
+        help: "By how much the system clock is ahead since it was set (negative: behind); 0 if it was not set",
         unit: Some(Unit::Seconds),
         read: |values| Seconds(values.clock_step_s),
     },

@@ -170,7 +170,7 @@ pub(super) async fn overall(
         commitment: season.commitment,
         competition: competition.short_title.clone(),
         frame: match query == BoardPageQuery::default() {
-            true => Frame::for_app(&app, season.name, "/").located(&app, "/"),
+            true => Frame::for_app(&app, season.name, "/").with_address(&app, "/"),
             false => Frame::for_app(&app, season.name, "/"),
         }
         .with_card(&app, &card_path("/card.png", &query), card_alt(&board)),

@@ -65,7 +65,7 @@ struct Documentation {
     outline: OnceLock<Vec<OutlineGroup>>,
     index: OnceLock<Index>,
     /// Held during a search.
-    search_turn: Arc<Mutex<()>>,
+    search_lock: Arc<Mutex<()>>,
 }
 
 impl Documentation {
@@ -102,7 +102,7 @@ pub(super) fn router(api: ApiDocument) -> Router<App> {
         reference: OnceLock::new(),
         outline: OnceLock::new(),
         index: OnceLock::new(),
-        search_turn: Arc::default(),
+        search_lock: Arc::default(),
     });
     Router::new()
         .route("/docs", get(contents))
@@ -343,14 +343,14 @@ async fn search_page(
         return Err(Problem::new(ProblemKind::InvalidRequest, detail).into());
     }
     let search_query = search_query.trim().to_owned();
-    // The first search builds the index, which takes CPU time. Only one search runs at a time, off the threads that handle requests, so that searching
-    // visitors wait for each other and not everybody for them.
-    let turn = Arc::clone(&documentation.search_turn).lock_owned().await;
+    // The first search builds the index, which takes CPU time. Searches run one at a time on a blocking thread, so that they do
+    // not delay other requests.
+    let guard = Arc::clone(&documentation.search_lock).lock_owned().await;
     let searched = Arc::clone(&documentation);
     let query = search_query.clone();
     let search = tokio::task::spawn_blocking(move || {
         // Held until the search has ended, even if the visitor does not wait for it.
-        let _turn = turn;
+        let _guard = guard;
         searched.index().search(&query)
     });
     let found = search.await.map_err(Problem::internal)?;

@@ -59,7 +59,7 @@ pub(super) fn plain_end(summary: &EpisodeLine, contacts: &[Contact]) -> String {
         ("hit", "left_table", false) if summary.end_description.starts_with(SLOW_GOAL) => {
             "No goal: the puck went in, but too slowly."
         }
-        ("hit", "crossed_middle", false) => return came_back(contacts),
+        ("hit", "crossed_middle", false) => return missed_shot_text(contacts),
         ("hit", "horizon", false) => "No goal before the time was up.",
         ("defend", _, true) => "Stopped: the puck came to rest where the agent can play it.",
         ("defend", "crossed_middle", false) => {
@@ -89,7 +89,7 @@ pub(super) fn plain_end(summary: &EpisodeLine, contacts: &[Contact]) -> String {
 }
 
 /// Why a shot came back, from what the puck hit last in the opponent's half.
-fn came_back(contacts: &[Contact]) -> String {
+fn missed_shot_text(contacts: &[Contact]) -> String {
     let last = contacts.iter().rfind(|contact| contact.x > 0.0);
     let cause = match last.map(|contact| (contact.what, contact.x)) {
         Some((ContactWith::OpponentMallet, _)) => "the opponent returned it",

@@ -291,7 +291,7 @@ pub(super) async fn page(
         violation_headers: format::violation_headers(app.config.competition()),
         frame: Frame::load(&app, "")
             .await?
-            .located(&app, &format!("/evaluations/{id}"))
+            .with_address(&app, &format!("/evaluations/{id}"))
             .with_card(
                 &app,
                 &format!("/evaluations/{id}/card.png"),

@@ -178,9 +178,9 @@ impl FileReader {
                 None => self.buffer.len().saturating_sub(self.delimiter.len() - 1),
             };
             if ready > 0 {
-                let later = self.buffer.split_off(ready);
-                let now = std::mem::replace(&mut self.buffer, later);
-                return Some((Ok(now.into()), self));
+                let rest = self.buffer.split_off(ready);
+                let ready_bytes = std::mem::replace(&mut self.buffer, rest);
+                return Some((Ok(ready_bytes.into()), self));
             }
             if let ReadState::File = self.state {
                 let error = match self.stream.next().await {

@@ -65,7 +65,7 @@ pub(super) fn score_interval(
     ]
 }
 
-/// A number as text counts things: up to ten in words.
+/// A count for running text: up to ten in words.
 pub(super) fn in_words(number: usize) -> String {
     const WORDS: [&str; 11] = [
         "no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten",

@@ -105,7 +105,7 @@ impl Frame {
     }
 
     /// Sets the page's own address.
-    pub(super) fn located(self, app: &AppState, path: &str) -> Self {
+    pub(super) fn with_address(self, app: &AppState, path: &str) -> Self {
         let base = app.config.public_url.as_deref();
         Self {
             address: base.map(|base| format!("{base}{path}")),

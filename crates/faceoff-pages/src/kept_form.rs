@@ -79,8 +79,8 @@ impl KeptForm {
         })
     }
 
-    /// The form among the fields of the sign-in page; `None` if it keeps none.
-    pub(super) fn among(fields: &[(String, String)]) -> Option<Self> {
+    /// The form that the fields of the sign-in page keep; `None` if they keep none.
+    pub(super) fn from_sign_in_fields(fields: &[(String, String)]) -> Option<Self> {
         let (_, path) = fields.iter().find(|(name, _)| name == PATH_FIELD)?;
         let kept = fields.iter().filter_map(|(name, value)| {
             let name = name.strip_prefix(PREFIX)?;
@@ -197,7 +197,7 @@ mod tests {
         let hidden: Vec<_> = hidden
             .map(|(name, value)| (name, value.to_owned()))
             .collect();
-        assert_eq!(KeptForm::among(&hidden), Some(form));
+        assert_eq!(KeptForm::from_sign_in_fields(&hidden), Some(form));
         for foreign in [
             "https://evil.example/organiser",
             "//evil.example",
@@ -205,7 +205,7 @@ mod tests {
             "/account",
         ] {
             let hidden = pairs(&[("form", foreign), ("kept.text", "a")]);
-            assert_eq!(KeptForm::among(&hidden), None, "{foreign}");
+            assert_eq!(KeptForm::from_sign_in_fields(&hidden), None, "{foreign}");
         }
     }
 }

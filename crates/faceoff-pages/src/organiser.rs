@@ -1,6 +1,5 @@
 //! `/organiser`: the organiser dashboard, the pages with which organisers run a season.
 
-mod attention;
 mod checklist;
 mod day;
 mod decision;
@@ -8,6 +7,7 @@ mod decision_page;
 mod form_lines;
 mod log;
 mod messages;
+mod overview;
 mod stage;
 mod stage_form;
 mod stages;
@@ -28,7 +28,7 @@ use faceoff_service::app::App;
 /// All pages of the dashboard, and its old log address.
 pub(super) fn router() -> Router<App> {
     Router::new()
-        .route("/organiser", get(attention::page))
+        .route("/organiser", get(overview::page))
         .route("/organiser/day", get(day::page))
         .route("/organiser/teams", get(teams::page))
         .route("/organiser/teams/season", post(teams::change_season))

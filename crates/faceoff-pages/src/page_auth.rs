@@ -64,12 +64,12 @@ pub(super) fn return_path_below<'a>(allowed: &[&str], path: &'a str) -> Option<&
     (is_plain && is_allowed).then_some(path)
 }
 
-/// `path` if it is one to which a dashboard's form may be sent, of which forms of an expired session are kept.
+/// `path` if it is below a dashboard. Forms that are sent there are kept when the session has expired.
 pub(super) fn form_path(path: &str) -> Option<&str> {
     return_path_below(&["/dashboard", "/organiser"], path)
 }
 
-/// The page of a dashboard that has the form which is sent to `path`: the dashboard's, since not every form's path is also a page.
+/// The start page of the dashboard that `path` is below. The path of a form is not always the path of a page.
 pub(super) fn form_page(path: &str) -> &'static str {
     let dashboard = RETURN_PATHS
         .iter()

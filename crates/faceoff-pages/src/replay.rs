@@ -75,7 +75,7 @@ pub(super) async fn page(
     render(&Page {
         frame: Frame::load(&app, "")
             .await?
-            .located(&app, &own_path)
+            .with_address(&app, &own_path)
             .with_card(
                 &app,
                 &format!("{own_path}/card.png"),

@@ -59,7 +59,7 @@ impl From<Vec<(String, String)>> for Form {
             name: text("name"),
             password: text("password"),
             next: text("next"),
-            kept: KeptForm::among(&fields),
+            kept: KeptForm::from_sign_in_fields(&fields),
         }
     }
 }

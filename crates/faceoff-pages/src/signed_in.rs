@@ -14,14 +14,14 @@ use faceoff_service::{
 };
 
 tokio::task_local! {
-    /// Whose request the current task handles. Every page shows the user, error pages included, so it is not passed through all of
-    /// their functions.
-    static SENDER: Sender;
+    /// The user whose request the current task handles; not set for a visitor. Every page shows the user, error pages included,
+    /// so it is not passed through all of their functions.
+    static CURRENT_USER: CurrentUser;
 }
 
-/// Who has sent a request for a page.
-enum Sender {
-    User(SignedIn),
+/// The user who has sent a request for a page.
+enum CurrentUser {
+    Known(SignedIn),
     /// The database could not be read.
     Unknown,
 }
@@ -39,9 +39,9 @@ pub(super) struct SignedIn {
 impl SignedIn {
     /// The user of the current request; `None` for visitors.
     pub(super) fn current() -> Option<Self> {
-        let user = SENDER.try_with(|sender| match sender {
-            Sender::User(user) => Some(user.clone()),
-            Sender::Unknown => None,
+        let user = CURRENT_USER.try_with(|current| match current {
+            CurrentUser::Known(user) => Some(user.clone()),
+            CurrentUser::Unknown => None,
         });
         user.ok().flatten()
     }
@@ -65,7 +65,7 @@ impl SignedIn {
 
 /// Has a visitor sent the current request? False if that is not known.
 pub(super) fn is_visitor() -> bool {
-    SENDER.try_with(|_| ()).is_err()
+    CURRENT_USER.try_with(|_| ()).is_err()
 }
 
 /// Builds a response for a user who has just signed in, and who had sent the request as a visitor.
@@ -79,7 +79,7 @@ pub(super) async fn with_user<T>(
         None => None,
     };
     match signed_in {
-        Some(user) => SENDER.scope(Sender::User(user), response).await,
+        Some(user) => CURRENT_USER.scope(CurrentUser::Known(user), response).await,
         None => response.await,
     }
 }
@@ -102,12 +102,20 @@ pub async fn identify_viewer(State(app): State<App>, mut request: Request, next:
         Ok(Some(caller)) => caller,
         Ok(None) => return next.run(request).await,
         // The page itself says what has failed.
-        Err(_) => return SENDER.scope(Sender::Unknown, next.run(request)).await,
+        Err(_) => {
+            return CURRENT_USER
+                .scope(CurrentUser::Unknown, next.run(request))
+                .await;
+        }
     };
     let signed_in = SignedIn::new(&app, &caller).await;
     request.extensions_mut().insert(SessionCaller(caller));
     match signed_in {
-        Some(user) => SENDER.scope(Sender::User(user), next.run(request)).await,
+        Some(user) => {
+            CURRENT_USER
+                .scope(CurrentUser::Known(user), next.run(request))
+                .await
+        }
         None => next.run(request).await,
     }
 }

@@ -101,7 +101,7 @@ pub(super) async fn page(
         tournaments: entered_tournaments(&app, id).await?,
         frame: Frame::load(&app, "")
             .await?
-            .located(&app, &format!("/teams/{id}"))
+            .with_address(&app, &format!("/teams/{id}"))
             .with_card(
                 &app,
                 &with_query(&format!("/teams/{id}/card.png"), &query),

@@ -137,7 +137,7 @@ pub(super) async fn page(
     let page = Page {
         frame: Frame::load(&app, format!("/tournaments/{id}"))
             .await?
-            .located(&app, &format!("/tournaments/{id}")),
+            .with_address(&app, &format!("/tournaments/{id}")),
         id,
         phase: tournament_text::phase_label(&view.head),
         format: tournament_text::describe_format(&view.rules),

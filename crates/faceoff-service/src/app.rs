@@ -65,9 +65,9 @@ pub struct AppState {
     /// Pictures of cards that show a link, as PNG, by the hash of their drawing.
     pub card_pictures: SharedCache<String, Vec<u8>>,
     /// One permit: only one such picture is drawn at a time, because the slots that run evaluations and games need the CPUs.
-    pub card_permit: Arc<Semaphore>,
+    pub card_drawing_permit: Arc<Semaphore>,
     /// A permit for each request that draws such a picture or waits for that; further ones are refused.
-    pub card_places: Arc<Semaphore>,
+    pub card_request_permits: Arc<Semaphore>,
     /// How often each team wins when a tournament is replayed with other seeds.
     pub(crate) champion_shares: TournamentAnswers<ChampionSharesView>,
     /// One permit: only one answer about a tournament is computed at a time, because the slots that run evaluations and games
@@ -140,8 +140,8 @@ impl AppState {
             game_analyses: SharedCache::with_bytes(MAX_ANALYSIS_BYTES, GameAnalysis::memory_bytes),
             highlights: SharedCache::with_entries(MAX_HIGHLIGHTS),
             card_pictures: SharedCache::with_bytes(MAX_CARD_BYTES, Vec::len),
-            card_permit: Arc::new(Semaphore::new(1)),
-            card_places: Arc::new(Semaphore::new(MAX_WAITING_CARDS)),
+            card_drawing_permit: Arc::new(Semaphore::new(1)),
+            card_request_permits: Arc::new(Semaphore::new(MAX_WAITING_CARDS)),
             champion_shares: SharedCache::with_entries(MAX_TOURNAMENTS),
             tournament_computation: Semaphore::new(1),
             has_tournaments: AtomicBool::new(false),

@@ -1,7 +1,7 @@
 //! Cards of the boards: the first teams.
 
 use super::{
-    layout::{Card, LEFT, RIGHT, Share, legible, text_style, tier_style},
+    layout::{Card, LEFT, PercentWithInterval, RIGHT, legible, text_style, tier_style},
     response::respond,
 };
 use crate::{board_status::shared_rank, frame::PageProblem};
@@ -80,9 +80,9 @@ fn draw_rows(card: &mut Card, board: &BoardView) {
     let mut y = FIRST_ROW;
     for row in board.rows.iter().take(MAX_TEAMS) {
         let result = board.task.and_then(|task| row.tasks.get(&task));
-        let share = match result {
-            Some(result) => Share::of_task(result),
-            None => Share::of_score(row.score, &row.tasks, &board.weights),
+        let value = match result {
+            Some(result) => PercentWithInterval::of_task(result),
+            None => PercentWithInterval::of_score(row.score, &row.tasks, &board.weights),
         };
         card.text(&shared_rank(&board.rows, row), &rank, [LEFT, y], 80.0);
         let team = name.truncated(legible(row.team.as_str()), NAME_WIDTH);
@@ -92,10 +92,10 @@ fn draw_rows(card: &mut Card, board: &BoardView) {
             let x = NAMES + name.width_px(&team) + 24.0;
             card.text(tier.title(), &tier_style(tier, 28.0), [x, y], 260.0);
         }
-        let percent = format!("{} %", share.percent());
+        let percent = format!("{} %", value.percent());
         card.text_at_end(&percent, &name, [RIGHT - 240.0, y], 220.0);
-        card.text_at_end(&share.interval(), &interval, [RIGHT, y], 220.0);
-        card.bar(&share, [NAMES, y + 26.0], (RIGHT - NAMES, 12.0));
+        card.text_at_end(&value.interval(), &interval, [RIGHT, y], 220.0);
+        card.bar(&value, [NAMES, y + 26.0], (RIGHT - NAMES, 12.0));
         y += ROW_HEIGHT;
     }
 }

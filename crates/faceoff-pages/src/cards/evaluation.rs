@@ -1,7 +1,7 @@
 //! The card of an evaluation: its score.
 
 use super::{
-    layout::{Card, Share},
+    layout::{Card, PercentWithInterval},
     response::respond,
 };
 use crate::frame::PageProblem;
@@ -40,7 +40,7 @@ async fn load(app: &App, id: EvaluationId) -> Result<Card, PageProblem> {
         return Ok(card);
     };
     let weights = competition.weights(&result.variation);
-    let score = Share::of_score(result.score, &result.tasks, &weights);
+    let score = PercentWithInterval::of_score(result.score, &result.tasks, &weights);
     card.score(&score, result.tier);
     card.tasks(competition, &result.tasks);
     Ok(card)

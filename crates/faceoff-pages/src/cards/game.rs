@@ -105,7 +105,7 @@ fn draw_score(card: &mut Card, view: &GameView, score: Option<[u32; 2]>) {
     card.text(away, &name("fair"), [middle + half, SCORE_LINE], width);
 }
 
-/// Some seconds of a game.
+/// The paths that the card shows: the last seconds before the first goal, or before the end of a game without goals.
 struct Scene {
     puck: Vec<[f64; 2]>,
     mallets: [Vec<[f64; 2]>; 2],

@@ -127,7 +127,7 @@ impl Card {
     }
 
     /// The score in large figures with its interval and its tier.
-    pub(super) fn score(&mut self, score: &Share, tier: Option<Tier>) {
+    pub(super) fn score(&mut self, score: &PercentWithInterval, tier: Option<Tier>) {
         let soft = text_style(Weight::Regular, 34.0, "soft");
         self.text("Score", &soft, [LEFT, 336.0], 400.0);
         let figure = text_style(Weight::Semibold, 116.0, "ink");
@@ -157,19 +157,25 @@ impl Card {
         let tasks = tasks.filter_map(|info| Some((&info.title, results.get(&info.task)?)));
         let mut y = 336.0;
         for (title, result) in tasks.take(MAX_TASKS) {
-            let share = Share::of_task(result);
+            let rate = PercentWithInterval::of_task(result);
             self.text(title, &label, [FROM, y], 330.0);
-            let percent = format!("{} %", share.percent());
+            let percent = format!("{} %", rate.percent());
             self.text_at_end(&percent, &figure, [RIGHT, y], 200.0);
-            self.bar(&share, [FROM, y + 28.0], (RIGHT - FROM, 18.0));
+            self.bar(&rate, [FROM, y + 28.0], (RIGHT - FROM, 18.0));
             y += 100.0;
         }
     }
 
-    /// A scale from 0 to 100 with a mark at 50, the interval as a range of this thickness and the share as a line, as on the board.
-    pub(super) fn bar(&mut self, share: &Share, [x, y]: [f64; 2], (width, thickness): (f64, f64)) {
+    /// A scale from 0 to 100 with a mark at 50, the interval as a range of this thickness and the value as a line, as on the
+    /// board.
+    pub(super) fn bar(
+        &mut self,
+        value: &PercentWithInterval,
+        [x, y]: [f64; 2],
+        (width, thickness): (f64, f64),
+    ) {
         let at = |percent: f64| x + width * percent.clamp(0.0, 100.0) / 100.0;
-        let [low, high] = share.interval.map(at);
+        let [low, high] = value.interval.map(at);
         let mut vertical = |x: f64, width: f64, height: f64, name: &str| {
             let corner = [x - width / 2.0, y - height / 2.0];
             self.drawing
@@ -185,7 +191,7 @@ impl Card {
             thickness,
             "range",
         );
-        vertical(at(share.percent), 6.0, thickness + 8.0, "ink");
+        vertical(at(value.percent), 6.0, thickness + 8.0, "ink");
     }
 }
 
@@ -199,12 +205,12 @@ pub(super) fn legible(text: &str) -> &str {
 
 /// A score or a success rate with its interval, in percent.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Share {
+pub(super) struct PercentWithInterval {
     percent: f64,
     interval: [f64; 2],
 }
 
-impl Share {
+impl PercentWithInterval {
     pub(super) fn of_task(result: &TaskView) -> Self {
         Self {
             percent: 100.0 * result.success_rate,

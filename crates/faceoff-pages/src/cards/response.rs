@@ -47,17 +47,17 @@ pub(super) async fn respond(
     Ok((headers, media_type, Vec::clone(&png)).into_response())
 }
 
-/// Draws a picture on a blocking thread. The thread holds place and permit to the end, also if the client has closed the connection.
+/// Draws a picture on a blocking thread. The thread holds both permits to the end, also if the client has closed the connection.
 async fn draw(app: &App, drawing: Drawing) -> Result<Arc<Vec<u8>>, Problem> {
-    let place = Arc::clone(&app.card_places).try_acquire_owned();
-    let place = place.map_err(|_| {
+    let request_permit = Arc::clone(&app.card_request_permits).try_acquire_owned();
+    let request_permit = request_permit.map_err(|_| {
         let detail = "too many pictures are being drawn at the moment; try again in 2 s";
         Problem::new(ProblemKind::Busy, detail)
     })?;
-    let permit = Arc::clone(&app.card_permit).acquire_owned().await;
-    let permit = permit.map_err(Problem::internal)?;
+    let drawing_permit = Arc::clone(&app.card_drawing_permit).acquire_owned().await;
+    let drawing_permit = drawing_permit.map_err(Problem::internal)?;
     let draw = move || -> Result<Vec<u8>, PictureError> {
-        let _held = (place, permit);
+        let _held = (request_permit, drawing_permit);
         Picture::draw(&drawing)?.png()
     };
     let png = tokio::task::spawn_blocking(draw)

@@ -19,7 +19,7 @@ pub(super) struct Place {
 struct StillDrawing<'a> {
     place: Place,
     height: f64,
-    rules: &'static str,
+    css: &'static str,
     view_box: &'a str,
     /// `None`: the empty table.
     still: Option<&'a Still>,
@@ -32,7 +32,7 @@ pub(super) fn svg(still: &Still, opponent: Option<Dot>, place: Place) -> String 
     render(&StillDrawing {
         height: height(&still.table, &place),
         place,
-        rules: style::drawing_rules(),
+        css: style::drawing_css(),
         view_box: &still.table.view_box,
         still: Some(still),
         opponent,
@@ -46,7 +46,7 @@ pub(super) fn empty_table(place: Place) -> String {
     render(&StillDrawing {
         height: height(&table, &place),
         place,
-        rules: style::drawing_rules(),
+        css: style::drawing_css(),
         view_box: &table.view_box,
         still: None,
         opponent: None,

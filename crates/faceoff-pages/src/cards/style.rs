@@ -3,8 +3,8 @@
 use crate::assets;
 use std::{collections::BTreeMap, sync::OnceLock};
 
-/// Begins of the lines of `episodes.css` that style drawings of the table.
-const DRAWING_RULES: [&str; 5] = [".table-map", ".mark", ".trajectory", ".start", ".disc"];
+/// Selectors with which the lines of `episodes.css` begin that style drawings of the table.
+const DRAWING_SELECTORS: [&str; 5] = [".table-map", ".mark", ".trajectory", ".start", ".disc"];
 
 /// Lines of drawings are visible at the size at which chats show cards.
 const WIDE_LINES: &str = ".trajectory{stroke-width:10}.mark.contact,.start,.disc{stroke-width:7}";
@@ -31,16 +31,20 @@ fn colours() -> &'static BTreeMap<&'static str, &'static str> {
 }
 
 /// The style sheet of drawings of the table, with colours in place of custom properties: drawings in pictures have none.
-pub(super) fn drawing_rules() -> &'static str {
-    static RULES: OnceLock<String> = OnceLock::new();
-    RULES.get_or_init(|| {
+pub(super) fn drawing_css() -> &'static str {
+    static CSS: OnceLock<String> = OnceLock::new();
+    CSS.get_or_init(|| {
         let lines = assets::EPISODES_STYLE.text().lines();
-        let rules = lines.filter(|line| DRAWING_RULES.iter().any(|rule| line.starts_with(rule)));
-        let mut rules: String = rules.collect();
+        let css = lines.filter(|line| {
+            DRAWING_SELECTORS
+                .iter()
+                .any(|selector| line.starts_with(selector))
+        });
+        let mut css: String = css.collect();
         for (name, value) in colours() {
-            rules = rules.replace(&format!("var(--{name})"), value);
+            css = css.replace(&format!("var(--{name})"), value);
         }
-        rules + WIDE_LINES
+        css + WIDE_LINES
     })
 }
 
@@ -55,13 +59,13 @@ mod tests {
     }
 
     #[test]
-    fn rules_of_drawings_have_colours_only() {
-        let rules = drawing_rules();
-        assert!(!rules.contains("var("), "{rules}");
+    fn drawing_css_has_no_custom_properties() {
+        let css = drawing_css();
+        assert!(!css.contains("var("), "{css}");
         assert!(
-            rules.contains(".trajectory.puck { stroke: #9a1f1f; }"),
-            "{rules}"
+            css.contains(".trajectory.puck { stroke: #9a1f1f; }"),
+            "{css}"
         );
-        assert!(!rules.contains("figcaption"), "{rules}");
+        assert!(!css.contains("figcaption"), "{css}");
     }
 }

@@ -1,7 +1,7 @@
 //! The card of a team: its latest result.
 
 use super::{
-    layout::{Card, Share},
+    layout::{Card, PercentWithInterval},
     response::respond,
 };
 use crate::frame::PageProblem;
@@ -59,7 +59,7 @@ async fn load(app: &App, id: TeamId, query: TeamPageQuery) -> Result<Card, PageP
         .ok_or_else(|| Problem::internal("history without its revision"))?;
     let weights = competition.weights(&revision.rules.variation);
     card.score(
-        &Share::of_score(latest.score, &latest.tasks, &weights),
+        &PercentWithInterval::of_score(latest.score, &latest.tasks, &weights),
         latest.tier,
     );
     card.tasks(competition, &latest.tasks);

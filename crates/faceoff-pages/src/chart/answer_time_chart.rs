@@ -1,6 +1,6 @@
 //! A chart of the agent's answer times: a row per task on a logarithmic axis. Lengths are in units of the drawing.
 
-use super::scale::{RIGHT, Tick, short};
+use super::scale::{RIGHT, Tick, axis_number};
 use crate::format;
 
 /// Ends of the time axis, as powers of ten of a millisecond.
@@ -50,7 +50,7 @@ pub(crate) struct AnswerTimeChart {
     /// y of the lower end of the plot.
     pub(crate) bottom: u32,
     pub(crate) height: u32,
-    /// The distributions as a table, a row per column.
+    /// The distributions as a table with a row per bin.
     pub(crate) counts: Vec<CountRow>,
     /// Text alternative for screen readers.
     pub(crate) description: String,
@@ -103,10 +103,10 @@ impl AnswerTimeChart {
         let bottom = y + ROW_HEIGHT / 2;
         let grid = [0.01, 0.1, 1.0, 10.0, 100.0, 1000.0].map(|ms| Tick {
             position: format::one_decimal(x(ms)),
-            label: short(ms),
+            label: axis_number(ms),
         });
         let texts = summaries.iter().map(|summary| {
-            let [mean, p99, max] = [summary.mean, summary.p99, summary.max].map(short);
+            let [mean, p99, max] = [summary.mean, summary.p99, summary.max].map(axis_number);
             format!(
                 "{}: mean {mean}, 99th percentile {p99}, maximum {max}",
                 summary.name
@@ -131,36 +131,36 @@ impl AnswerTimeChart {
     }
 }
 
-/// A row per column with at least one time.
+/// A row per bin with at least one time.
 fn count_rows(summaries: &[TimeSummary]) -> Vec<CountRow> {
-    // All tasks have the same columns; some have fewer.
+    // All tasks have the same bins; some have fewer.
     let longest = summaries
         .iter()
         .map(|summary| &summary.bins)
         .max_by_key(|all| all.len());
-    let columns = longest.into_iter().flatten().enumerate();
-    let rows = columns.map(|(column, bin)| CountRow {
+    let bins = longest.into_iter().flatten().enumerate();
+    let rows = bins.map(|(index, bin)| CountRow {
         from: format::two_significant_digits(bin.from),
         to: format::two_significant_digits(bin.to),
         counts: summaries
             .iter()
-            .map(|summary| summary.bins.get(column).map_or(0, |bin| bin.count))
+            .map(|summary| summary.bins.get(index).map_or(0, |bin| bin.count))
             .collect(),
     });
     rows.filter(|row| row.counts.iter().any(|count| *count > 0))
         .collect()
 }
 
-/// Columns above `bottom`. Heights are logarithmic, so that a few slow answers among thousands stay visible.
+/// Bars of the bins above `bottom`. Heights are logarithmic, so that a few slow answers among thousands stay visible.
 fn distribution(bins: &[TimeBin], bottom: u32) -> String {
     let height = |count: u64| (1.0 + count as f64).ln();
     let max = bins.iter().map(|bin| bin.count).max().map_or(1.0, height);
-    let columns = bins.iter().filter(|bin| bin.count > 0).map(|bin| {
+    let bars = bins.iter().filter(|bin| bin.count > 0).map(|bin| {
         let top = f64::from(bottom) - DISTRIBUTION_HEIGHT * height(bin.count) / max;
         let [left, right, top] = [x(bin.from), x(bin.to), top].map(format::one_decimal);
         format!("M{left} {bottom}V{top}H{right}V{bottom}z")
     });
-    columns.collect()
+    bars.collect()
 }
 
 /// x of a time.

@@ -1,6 +1,6 @@
 //! Histograms: numbers of values in columns of equal width.
 
-use super::scale::{BOTTOM, GRID_INTERVALS, LEFT, RIGHT, Scale, Tick, short};
+use super::scale::{BOTTOM, GRID_INTERVALS, LEFT, RIGHT, Scale, Tick, axis_number};
 use crate::format;
 
 /// Largest number of labels below the columns; more would overlap on a phone.
@@ -61,7 +61,7 @@ impl Bins {
 
     /// Range of a column as text.
     pub(crate) fn label(self, column: usize) -> String {
-        let [from, to] = [column, column + 1].map(|edge| short(self.start(edge)));
+        let [from, to] = [column, column + 1].map(|edge| axis_number(self.start(edge)));
         format!("{from} to {to}")
     }
 
@@ -73,7 +73,7 @@ impl Bins {
         let step = self.count.div_ceil(MAX_LABELS);
         let edges = (0..=self.count).step_by(step).map(|edge| Tick {
             position: format::one_decimal(self.x(edge)),
-            label: short(self.start(edge)),
+            label: axis_number(self.start(edge)),
         });
         edges.collect()
     }

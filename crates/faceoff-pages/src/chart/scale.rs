@@ -35,7 +35,7 @@ impl Scale {
             let value = self.max * f64::from(part) / f64::from(GRID_INTERVALS);
             Tick {
                 position: format::one_decimal(self.y(value)),
-                label: short(value),
+                label: axis_number(value),
             }
         };
         (0..=GRID_INTERVALS).map(line).collect()
@@ -53,7 +53,7 @@ pub(super) fn round_up(value: f64) -> f64 {
 }
 
 /// A number on an axis.
-pub(super) fn short(value: f64) -> String {
+pub(super) fn axis_number(value: f64) -> String {
     without_trailing_zeros(value, 3)
 }
 

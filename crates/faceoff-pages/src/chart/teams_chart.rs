@@ -86,7 +86,7 @@ impl TeamsChart {
                 label: None,
             });
         }
-        let positions = apart(labels.iter().map(|(_, y)| *y).collect());
+        let positions = spread_labels(labels.iter().map(|(_, y)| *y).collect());
         for ((style, ((index, _), position)), end) in
             (1..).zip(labels.iter().zip(positions)).zip(ends)
         {
@@ -113,7 +113,7 @@ impl TeamsChart {
 }
 
 /// Moves labels down until none overlaps, then up from the lowest position.
-fn apart(wanted: Vec<f64>) -> Vec<f64> {
+fn spread_labels(wanted: Vec<f64>) -> Vec<f64> {
     let mut order: Vec<usize> = (0..wanted.len()).collect();
     order.sort_by(|a, b| wanted[*a].total_cmp(&wanted[*b]));
     let mut positions = wanted;
@@ -181,7 +181,7 @@ mod tests {
 
     #[test]
     fn labels_stay_inside_of_the_drawing() {
-        let positions = apart(vec![249.0, 249.0, 12.0]);
+        let positions = spread_labels(vec![249.0, 249.0, 12.0]);
         assert_eq!(positions, [232.0, 250.0, 12.0]);
     }
 }

@@ -328,7 +328,7 @@ async fn create_token(
     }
 }
 
-/// After a change the page with a notice (its key), after a refusal the page with the problem.
+/// Redirects to the page with the notice `key` after a change; shows the page with the problem after a refusal.
 async fn after_change<T>(
     app: &App,
     caller: &Caller,
@@ -344,8 +344,8 @@ async fn after_change<T>(
     }
 }
 
-/// As [`after_change`]; if anything else has ended, the page lists it.
-async fn after_ending(
+/// As [`after_change`], for a revoked token or a removed user: the page lists the other credentials that ended with it.
+async fn after_revocation(
     app: &App,
     caller: &Caller,
     changed: Result<Option<EndedCredentialsView>, Problem>,
@@ -375,7 +375,7 @@ async fn revoke_token(
     let (PathParam(id), PageForm(EmptyForm {})) = (id?, form?);
     let changed = tokens::revoke_token(&app, &caller, id, None).await;
     let ended = changed.map(|revoked| revoked.ended);
-    after_ending(&app, &caller, ended, "revoked").await
+    after_revocation(&app, &caller, ended, "revoked").await
 }
 
 #[derive(Deserialize)]
@@ -480,5 +480,5 @@ async fn remove_user(
     let changed = users::remove_user(&app, &caller, id, confirm).await;
     let now = app.config.clock.now();
     let ended = changed.map(|(_, ended)| credentials::ended(ended, now));
-    after_ending(&app, &caller, ended, "removed").await
+    after_revocation(&app, &caller, ended, "removed").await
 }

@@ -28,7 +28,7 @@ pub(super) struct SearchResults {
     /// Number of results, including those that are not shown.
     pub(super) count: usize,
     pub(super) shown: usize,
-    /// For a query with slips: what the results are for.
+    /// The corrected query that the results are for, if words of the query were replaced.
     pub(super) correction: Option<Correction>,
 }
 
@@ -148,7 +148,7 @@ impl Index {
                 let section = &self.sections[posting.section];
                 let is_title = posting.in_title && section.is_start();
                 let occurrences = posting.in_text.min(MAX_COUNTED_OCCURRENCES);
-                let score = if term.is_synonym {
+                let score = if term.is_secondary {
                     let is_heading = is_title || posting.in_heading;
                     Score {
                         synonyms: if is_heading {
@@ -211,7 +211,7 @@ impl Index {
 }
 
 impl Hit {
-    /// Of a section that matches two words of the query.
+    /// Combines the matches of a section with two words of the query: the scores add up.
     fn and(self, other: Self) -> Self {
         Self {
             score: Score {
@@ -225,7 +225,7 @@ impl Hit {
         }
     }
 
-    /// Of a section that matches a word of the query by two terms.
+    /// Combines the matches of a section with two terms for the same word: the better score counts.
     fn or(self, other: Self) -> Self {
         Self {
             score: Score {

@@ -100,8 +100,8 @@ fn is_vowel(byte: u8) -> bool {
     b"aeiouy".contains(&byte)
 }
 
-/// Does one slip of the keyboard separate two words: a letter too many, too few or wrong, or two neighbours swapped?
-pub(super) fn is_one_slip(a: &str, b: &str) -> bool {
+/// Does one typo separate two words: a letter too many, too few or wrong, or two neighbours swapped?
+pub(super) fn is_one_typo(a: &str, b: &str) -> bool {
     let (a, b) = (a.as_bytes(), b.as_bytes());
     if a.len().abs_diff(b.len()) > 1 {
         return false;
@@ -190,18 +190,18 @@ mod tests {
     }
 
     #[test]
-    fn one_slip_is_one_letter_or_one_swap() {
-        for (word, slip) in [
+    fn one_typo_is_one_letter_or_one_swap() {
+        for (word, typo) in [
             ("mallet", "malet"),
             ("mallet", "malllet"),
             ("mallet", "mellet"),
             ("mallet", "mlalet"),
             ("mallet", "mallets"),
         ] {
-            assert!(is_one_slip(word, slip) && is_one_slip(slip, word), "{slip}");
+            assert!(is_one_typo(word, typo) && is_one_typo(typo, word), "{typo}");
         }
         for other in ["mallet", "malte", "wallets", "met", "mlaelt"] {
-            assert!(!is_one_slip("mallet", other), "{other}");
+            assert!(!is_one_typo("mallet", other), "{other}");
         }
     }
 }

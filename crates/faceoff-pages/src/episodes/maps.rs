@@ -59,7 +59,7 @@ pub(super) struct SuccessTable {
     pub(super) rows: Vec<SuccessRow>,
 }
 
-/// Solved episodes of a class.
+/// Solved episodes of a range.
 pub(super) struct SuccessRow {
     pub(super) range: String,
     pub(super) solved: usize,
@@ -139,33 +139,37 @@ fn speed([_, _, vx, vy]: [f64; 4]) -> f64 {
     (vx * vx + vy * vy).sqrt()
 }
 
-/// Success by classes of a value, each `width` wide. Empty classes are omitted; a single class gives no rows.
+/// Success by ranges of a value, each `width` wide. Empty ranges are omitted; a single range gives no rows.
 fn success_by(
     summaries: &[&EpisodeLine],
     value: impl Fn([f64; 4]) -> f64,
     unit: &str,
     width: f64,
 ) -> Vec<SuccessRow> {
-    let class = |summary: &EpisodeLine| (value(summary.start.unwrap_or_default()) / width).floor();
-    let mut classes: Vec<f64> = summaries.iter().map(|summary| class(summary)).collect();
-    classes.sort_by(f64::total_cmp);
-    classes.dedup();
-    if classes.len() < 2 {
+    let range_index =
+        |summary: &EpisodeLine| (value(summary.start.unwrap_or_default()) / width).floor();
+    let mut range_indices: Vec<f64> = summaries
+        .iter()
+        .map(|summary| range_index(summary))
+        .collect();
+    range_indices.sort_by(f64::total_cmp);
+    range_indices.dedup();
+    if range_indices.len() < 2 {
         return Vec::new();
     }
-    classes
+    range_indices
         .into_iter()
-        .map(|class_number| {
+        .map(|index| {
             let inside: Vec<_> = summaries
                 .iter()
-                .filter(|summary| class(summary).total_cmp(&class_number).is_eq())
+                .filter(|summary| range_index(summary).total_cmp(&index).is_eq())
                 .collect();
             let solved = inside.iter().filter(|summary| summary.success).count();
             SuccessRow {
                 range: format!(
                     "{} … {} {unit}",
-                    format::signed(class_number * width).trim_start_matches('+'),
-                    format::signed((class_number + 1.0) * width).trim_start_matches('+'),
+                    format::signed(index * width).trim_start_matches('+'),
+                    format::signed((index + 1.0) * width).trim_start_matches('+'),
                 ),
                 solved,
                 total: inside.len(),

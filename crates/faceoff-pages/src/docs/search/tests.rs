@@ -1,4 +1,4 @@
-//! The search: ranking, forms of words, slips, synonyms, and the texts of results.
+//! The search: ranking, forms of words, typos, synonyms, and the texts of results.
 
 use super::{snippet::SNIPPET_BYTES, *};
 
@@ -121,18 +121,18 @@ fn other_forms_of_a_word_are_found_and_marked() {
 }
 
 #[test]
-fn slip_is_corrected_only_in_an_unknown_long_word() {
+fn typo_is_corrected_only_in_an_unknown_long_word() {
     let index = Index::new([
         section("Mallet", "mallet mallet"),
         section("Mullet", "a mullet fish"),
         section("Ballet", "the ballet"),
     ]);
-    for slip in ["mallte", "malet", "mmallet", "xallet"] {
-        let found = index.search(&format!("The {slip}?"));
-        assert_eq!(text_of(&results(&found)[0].heading), "Mallet", "{slip}");
+    for typo in ["mallte", "malet", "mmallet", "xallet"] {
+        let found = index.search(&format!("The {typo}?"));
+        assert_eq!(text_of(&results(&found)[0].heading), "Mallet", "{typo}");
         let correction = found.correction.unwrap();
         assert_eq!(correction.query, "the mallet");
-        assert_eq!(correction.unknown, [slip]);
+        assert_eq!(correction.unknown, [typo]);
     }
     // A word that exists is searched as it is; short words have too many neighbours.
     assert_eq!(headings(&index, "mullet"), ["Mullet"]);

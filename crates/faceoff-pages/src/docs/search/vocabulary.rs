@@ -3,13 +3,13 @@
 use super::super::{
     sections::Section,
     synonyms::SYNONYMS,
-    words::{is_one_slip, parts, stem, words},
+    words::{is_one_typo, parts, stem, words},
 };
 use std::collections::{BTreeMap, HashMap};
 
 /// Shortest beginning of a word that is searched as such, in bytes.
 const MIN_BEGINNING: usize = 3;
-/// Shortest word in which a slip is corrected, in bytes.
+/// Shortest word in which a typo is corrected, in bytes.
 const MIN_CORRECTED: usize = 5;
 
 /// Occurrences of a stem in a section.
@@ -30,8 +30,8 @@ pub(super) struct Posting {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Term {
     pub(super) stem: usize,
-    /// Does it stand beside the word itself, which the documentation has, too?
-    pub(super) is_synonym: bool,
+    /// True for a synonym of a word that the documentation has itself. Its matches rank below those of the word.
+    pub(super) is_secondary: bool,
 }
 
 /// The terms for a word of the query; none if the documentation has nothing like it.
@@ -65,7 +65,7 @@ impl Term {
     fn of_query(stem: usize) -> Self {
         Self {
             stem,
-            is_synonym: false,
+            is_secondary: false,
         }
     }
 }
@@ -141,7 +141,7 @@ impl Vocabulary {
     }
 
     /// The terms for a word in lower case: its forms and synonyms; else words that begin with it; else those for a word that
-    /// differs by a slip.
+    /// differs by a typo.
     pub(super) fn find(&self, word: &str) -> QueryTerms {
         let terms = self.forms_and_synonyms(word);
         if !terms.is_empty() {
@@ -171,7 +171,7 @@ impl Vocabulary {
         let others = others.iter().filter_map(|other| self.stem_of(other));
         let others = others.map(|stem| Term {
             stem,
-            is_synonym: same.is_some(),
+            is_secondary: same.is_some(),
         });
         let same = same.map(Term::of_query);
         same.into_iter().chain(others).collect()
@@ -189,9 +189,9 @@ impl Vocabulary {
         stems.into_iter().map(Term::of_query).collect()
     }
 
-    /// The most frequent word that differs by a slip, or a word with synonyms.
+    /// The most frequent word that differs by a typo, or a word with synonyms.
     fn correct(&self, word: &str) -> Option<&str> {
-        let is_near = |other: &str| is_one_slip(word, other);
+        let is_near = |other: &str| is_one_typo(word, other);
         if word.len() < MIN_CORRECTED {
             return None;
         }

@@ -9,7 +9,7 @@ use faceoff_store::Actor;
 pub(in crate::organiser) struct ClockDecision;
 
 /// Page to return to.
-const ATTENTION_PATH: &str = "/organiser";
+const OVERVIEW_PATH: &str = "/organiser";
 
 impl ClockDecision {
     pub(super) fn preview(self, app: &AppState) -> Result<DecisionPreview, Problem> {
@@ -18,7 +18,7 @@ impl ClockDecision {
             button: "Accept the clock",
             ..DecisionPreview::needing_confirmation(
                 clock::preview_accepted_step(app)?,
-                ATTENTION_PATH,
+                OVERVIEW_PATH,
             )
         })
     }
@@ -30,6 +30,6 @@ impl ClockDecision {
         request: requests::Decision,
     ) -> Result<Done, Problem> {
         clock::accept_step(app, actor, request.confirm.as_deref()).await?;
-        Ok(Done::new("clock-accepted", ATTENTION_PATH))
+        Ok(Done::new("clock-accepted", OVERVIEW_PATH))
     }
 }

@@ -33,13 +33,13 @@ impl EventText<'_> {
 
 /// The event as a sentence without its full stop: “Anna disqualified Alpha: it read the seed”.
 pub(super) fn sentence(event: &EventView, names: &Names) -> String {
-    let words = EventText {
+    let event_text = EventText {
         event,
         subject: names.subject(&event.subject),
     };
-    let mut text = format!("{} {}", names.actor(event), predicate(&words, names));
-    // The event of an application has the reason of another one.
-    let reason = words.field("reason");
+    let mut text = format!("{} {}", names.actor(event), predicate(&event_text, names));
+    // Not every event has a reason.
+    let reason = event_text.field("reason");
     if !reason.is_empty() {
         text.push_str(": ");
         text.push_str(&reason);
@@ -48,49 +48,55 @@ pub(super) fn sentence(event: &EventView, names: &Names) -> String {
 }
 
 /// What the author did.
-fn predicate(words: &EventText<'_>, names: &Names) -> String {
-    about_access(words, names)
-        .or_else(|| about_teams(words, names))
-        .or_else(|| about_evaluations(words, names))
-        .or_else(|| about_season(words, names))
-        .or_else(|| about_tournaments(words, names))
+fn predicate(event_text: &EventText<'_>, names: &Names) -> String {
+    about_access(event_text, names)
+        .or_else(|| about_teams(event_text, names))
+        .or_else(|| about_evaluations(event_text, names))
+        .or_else(|| about_season(event_text, names))
+        .or_else(|| about_tournaments(event_text, names))
         // Events of later versions, which this list does not know yet.
         .unwrap_or_else(|| {
-            let kind = words.event.kind.replace('_', " ");
-            format!("recorded “{kind}” for {}", words.subject)
+            let kind = event_text.event.kind.replace('_', " ");
+            format!("recorded “{kind}” for {}", event_text.subject)
         })
 }
 
 /// Accounts, invitations, tokens and webhooks.
-fn about_access(words: &EventText<'_>, names: &Names) -> Option<String> {
-    let (subject, name) = (&words.subject, words.field("name"));
-    Some(match words.event.kind.as_str() {
+fn about_access(event_text: &EventText<'_>, names: &Names) -> Option<String> {
+    let (subject, name) = (&event_text.subject, event_text.field("name"));
+    Some(match event_text.event.kind.as_str() {
         "token_replaced" => format!("replaced the token of {subject}"),
         "token_created" => format!("created the token “{name}” for {subject}"),
         "token_rotated" => format!("gave the token “{name}” of {subject} a new secret"),
         "token_revoked" => format!("revoked the token “{name}” of {subject}"),
         "invited" => {
-            let role = match words.field("role").as_str() {
+            let role = match event_text.field("role").as_str() {
                 "return" => "for a new password".to_owned(),
                 "founder" => "for the first member of a new team".to_owned(),
                 role => format!("for a new {role}"),
             };
-            format!("created the invitation “{}” {role}", words.field("note"))
+            format!(
+                "created the invitation “{}” {role}",
+                event_text.field("note")
+            )
         }
         "invitation_revoked" => "revoked an invitation".to_owned(),
-        "person_joined" => match names.team(&words.field("team")) {
+        "person_joined" => match names.team(&event_text.field("team")) {
             Some(team) => format!("joined the team {team}"),
             None => "joined as an organiser".to_owned(),
         },
         "person_renamed" => format!(
             "renamed the user {} to {}",
-            words.field("from"),
-            words.field("to")
+            event_text.field("from"),
+            event_text.field("to")
         ),
         "person_left" => format!("closed the account of {name}"),
         "signed_in" => "signed in".to_owned(),
         "password_set" => "set a new password".to_owned(),
-        "terms_accepted" => format!("accepted version {} of the terms", words.field("version")),
+        "terms_accepted" => format!(
+            "accepted version {} of the terms",
+            event_text.field("version")
+        ),
         "webhook_created" => format!("created the webhook “{name}” of {subject}"),
         "webhook_changed" => format!("changed the webhook “{name}” of {subject}"),
         "webhook_rotated" => format!("gave the webhook “{name}” of {subject} a new secret"),
@@ -101,17 +107,21 @@ fn about_access(words: &EventText<'_>, names: &Names) -> Option<String> {
 }
 
 /// Teams, registrations, questions and submissions.
-fn about_teams(words: &EventText<'_>, names: &Names) -> Option<String> {
-    let subject = &words.subject;
-    Some(match words.event.kind.as_str() {
-        "team_created" => format!("created the team {}", words.field("name")),
-        "team_registered" => format!("registered the team {}", words.field("name")),
+fn about_teams(event_text: &EventText<'_>, names: &Names) -> Option<String> {
+    let subject = &event_text.subject;
+    Some(match event_text.event.kind.as_str() {
+        "team_created" => format!("created the team {}", event_text.field("name")),
+        "team_registered" => format!("registered the team {}", event_text.field("name")),
         "registration_approved" => {
-            let team = names.team(&words.field("team"));
+            let team = names.team(&event_text.field("team"));
             format!("approved the registration of {}", team.unwrap_or("a team"))
         }
         "registration_refused" => format!("refused {subject}"),
-        "team_renamed" => format!("renamed {} to {}", words.field("from"), words.field("to")),
+        "team_renamed" => format!(
+            "renamed {} to {}",
+            event_text.field("from"),
+            event_text.field("to")
+        ),
         "team_described" => format!("changed the description of {subject}"),
         "team_made_baseline" => format!("made {subject} a reference agent"),
         "team_made_ranked" => format!("made {subject} a ranked team"),
@@ -120,21 +130,21 @@ fn about_teams(words: &EventText<'_>, names: &Names) -> Option<String> {
         "team_disqualified" => format!("disqualified {subject}"),
         "team_reinstated" => format!("reinstated {subject}"),
         "asked" => {
-            let team = names.team(&words.field("team"));
+            let team = names.team(&event_text.field("team"));
             format!("asked a question for {}", team.unwrap_or("a team"))
         }
-        "answered" if words.field("public") == "true" => {
+        "answered" if event_text.field("public") == "true" => {
             format!("answered {subject} and published the answer")
         }
         "answered" => format!("answered {subject}"),
-        "submission_uploaded" => match names.team(&words.field("team")) {
+        "submission_uploaded" => match names.team(&event_text.field("team")) {
             Some(team) => format!("uploaded a submission for {team}"),
             None => "uploaded a submission".to_owned(),
         },
         "submission_valid" => {
             format!(
                 "found {subject} valid: agent “{}”",
-                words.field("agent_name")
+                event_text.field("agent_name")
             )
         }
         "submission_invalid" => format!("found {subject} invalid"),
@@ -142,13 +152,13 @@ fn about_teams(words: &EventText<'_>, names: &Names) -> Option<String> {
         "submission_activated" => format!("chose {subject} for the next cutoff"),
         "submission_not_taken" => format!(
             "excluded {subject} from {} on {}",
-            names.stage(&words.field("stage")).unwrap_or("a stage"),
-            words.field("day")
+            names.stage(&event_text.field("stage")).unwrap_or("a stage"),
+            event_text.field("day")
         ),
         "submission_withdrawn" => format!("withdrew {subject}"),
         "submission_deleted" => format!("deleted {subject}"),
         "archive_removed" => format!("deleted the bundle of {subject}"),
-        "submission_labelled" => match words.field("label") {
+        "submission_labelled" => match event_text.field("label") {
             label if label.is_empty() => format!("removed the name of {subject}"),
             label => format!("named {subject} “{label}”"),
         },
@@ -158,17 +168,21 @@ fn about_teams(words: &EventText<'_>, names: &Names) -> Option<String> {
 }
 
 /// Evaluations, days, proposals and ablations.
-fn about_evaluations(words: &EventText<'_>, names: &Names) -> Option<String> {
-    let subject = &words.subject;
-    Some(match words.event.kind.as_str() {
-        "evaluation_queued" if !words.field("rerun_of").is_empty() => {
+fn about_evaluations(event_text: &EventText<'_>, names: &Names) -> Option<String> {
+    let subject = &event_text.subject;
+    Some(match event_text.event.kind.as_str() {
+        "evaluation_queued" if !event_text.field("rerun_of").is_empty() => {
             format!("queued {subject} once more")
         }
         "evaluation_queued" => format!("queued {subject}"),
         "evaluation_begun" => format!("started {subject}"),
         "evaluation_finalising" => format!("started to score {subject}"),
         "evaluation_finished" => {
-            let score = words.event.details.get("score").and_then(Value::as_f64);
+            let score = event_text
+                .event
+                .details
+                .get("score")
+                .and_then(Value::as_f64);
             let score = score.map(crate::format::one_decimal).unwrap_or_default();
             format!("finished {subject} with {score} %")
         }
@@ -182,11 +196,11 @@ fn about_evaluations(words: &EventText<'_>, names: &Names) -> Option<String> {
         "evaluation_applied" => format!("replaced {subject} by its proposed re-evaluation"),
         "day_started" => format!(
             "started {subject} with {}",
-            words.count("evaluations", "evaluation")
+            event_text.count("evaluations", "evaluation")
         ),
         "day_overdue" => format!(
             "ended {subject} at its deadline, {} unfinished",
-            words.count("not_played", "evaluation")
+            event_text.count("not_played", "evaluation")
         ),
         "day_released" => format!("released {subject}"),
         "day_voided" => format!("voided {subject}"),
@@ -197,17 +211,17 @@ fn about_evaluations(words: &EventText<'_>, names: &Names) -> Option<String> {
         "ablation_failed" => format!("gave up {subject}"),
         "proposal_made" => format!(
             "proposed to re-evaluate {} of {}",
-            words.count("evaluations", "evaluation"),
-            names.stage(&words.field("stage")).unwrap_or("a stage")
+            event_text.count("evaluations", "evaluation"),
+            names.stage(&event_text.field("stage")).unwrap_or("a stage")
         ),
         "proposal_played" => format!("finished {subject}"),
         "proposal_applied" => format!("applied {subject}"),
         "proposal_dropped" => format!("dropped {subject}"),
         "shard_committed" => format!(
             "finished episodes {} to {} of {} in {subject}",
-            words.field("first_episode"),
-            words.field("end_episode"),
-            words.field("task")
+            event_text.field("first_episode"),
+            event_text.field("end_episode"),
+            event_text.field("task")
         ),
         "unit_given_back" => format!("gave a job of {subject} back to the queue"),
         _ => return None,
@@ -215,16 +229,19 @@ fn about_evaluations(words: &EventText<'_>, names: &Names) -> Option<String> {
 }
 
 /// The season, its stages, the queue and the workers.
-fn about_season(words: &EventText<'_>, _: &Names) -> Option<String> {
-    let (subject, name) = (&words.subject, words.field("name"));
-    Some(match words.event.kind.as_str() {
+fn about_season(event_text: &EventText<'_>, _: &Names) -> Option<String> {
+    let (subject, name) = (&event_text.subject, event_text.field("name"));
+    Some(match event_text.event.kind.as_str() {
         "season_named" => format!("named the season “{name}”"),
         "season_closed" => "closed the season".to_owned(),
-        "terms_published" => format!("published version {} of the terms", words.field("version")),
+        "terms_published" => format!(
+            "published version {} of the terms",
+            event_text.field("version")
+        ),
         "divisions_set" => "changed the divisions".to_owned(),
         "registration_opened" => "opened the registration of teams".to_owned(),
         "registration_closed" => "closed the registration of teams".to_owned(),
-        "announced" => format!("announced “{}”", words.field("title")),
+        "announced" => format!("announced “{}”", event_text.field("title")),
         "boards_frozen" => format!("froze the boards of {subject}"),
         "boards_unfrozen" => format!("unfroze the boards of {subject}"),
         "stage_created" => format!("created the stage {name}"),
@@ -233,40 +250,47 @@ fn about_season(words: &EventText<'_>, _: &Names) -> Option<String> {
         "stage_rules_changed" => {
             format!(
                 "changed the rules of {subject}: revision {}",
-                words.field("revision")
+                event_text.field("revision")
             )
         }
         "stage_final_started" => {
-            format!("started the final day of {subject}, {}", words.field("day"))
+            format!(
+                "started the final day of {subject}, {}",
+                event_text.field("day")
+            )
         }
         "stage_finalised" => format!("signed off {subject}"),
         "queue_paused" => "paused the queue".to_owned(),
         "queue_resumed" => "resumed the queue".to_owned(),
         "clock_step_accepted" => format!(
             "accepted the system clock, which was {}",
-            words.field("size")
+            event_text.field("size")
         ),
-        "worker_banned" => format!("banned the worker {}", words.field("worker")),
-        "worker_readmitted" => format!("readmitted the worker {}", words.field("worker")),
+        "worker_banned" => format!("banned the worker {}", event_text.field("worker")),
+        "worker_readmitted" => format!("readmitted the worker {}", event_text.field("worker")),
         _ => return None,
     })
 }
 
 /// Tournaments and their games.
-fn about_tournaments(words: &EventText<'_>, names: &Names) -> Option<String> {
-    let subject = &words.subject;
+fn about_tournaments(event_text: &EventText<'_>, names: &Names) -> Option<String> {
+    let subject = &event_text.subject;
     let team = || {
-        let team = names.team(&words.field("team"));
+        let team = names.team(&event_text.field("team"));
         team.unwrap_or("a team").to_owned()
     };
-    Some(match words.event.kind.as_str() {
-        "tournament_opened" => format!("opened the tournament {}", words.field("name")),
-        "tournament_changed" => format!("changed the tournament {}", words.field("name")),
+    Some(match event_text.event.kind.as_str() {
+        "tournament_opened" => format!("opened the tournament {}", event_text.field("name")),
+        "tournament_changed" => format!("changed the tournament {}", event_text.field("name")),
         "tournament_paused" => format!("paused {subject}"),
         "tournament_resumed" => format!("resumed {subject}"),
         "tournament_closed" => format!("closed {subject}"),
         "teams_entered" => {
-            let teams = words.event.details.get("teams").and_then(Value::as_array);
+            let teams = event_text
+                .event
+                .details
+                .get("teams")
+                .and_then(Value::as_array);
             let teams = teams.into_iter().flatten().filter_map(Value::as_str);
             let teams: Vec<&str> = teams.filter_map(|id| names.team(id)).collect();
             format!("entered {} for {subject}", teams.join(", "))
@@ -276,24 +300,24 @@ fn about_tournaments(words: &EventText<'_>, names: &Names) -> Option<String> {
             format!(
                 "removed {} from {subject} from round {} on",
                 team(),
-                words.field("from_round")
+                event_text.field("from_round")
             )
         }
         "round_started" => format!(
             "started round {} of {subject} with {}",
-            words.field("round"),
-            words.count("games", "game")
+            event_text.field("round"),
+            event_text.count("games", "game")
         ),
-        "round_over" => format!("ended round {} of {subject}", words.field("round")),
+        "round_over" => format!("ended round {} of {subject}", event_text.field("round")),
         "replays_ordered" => format!(
             "queued {} to replay {subject}",
-            words.count("games", "game")
+            event_text.count("games", "game")
         ),
         "replays_cancelled" => format!(
             "cancelled {} that replay {subject}",
-            words.count("games", "game")
+            event_text.count("games", "game")
         ),
-        "free_game_queued" => match names.team(&words.field("opponent")) {
+        "free_game_queued" => match names.team(&event_text.field("opponent")) {
             Some(opponent) => format!("queued a friendly game of {} against {opponent}", team()),
             None => format!("queued a test game of {}", team()),
         },
@@ -303,7 +327,7 @@ fn about_tournaments(words: &EventText<'_>, names: &Names) -> Option<String> {
         "game_voided" => format!("voided {subject}"),
         "game_queued_again" => format!("queued {subject} once more"),
         "game_cancelled" => format!("cancelled {subject}"),
-        "friendly_games_declined" if words.field("declines") == "true" => {
+        "friendly_games_declined" if event_text.field("declines") == "true" => {
             format!("declined friendly games for {subject}")
         }
         "friendly_games_declined" => format!("accepted friendly games for {subject}"),

@@ -34,7 +34,7 @@ use faceoff_types::{StageDay, StageId, StageName};
 use std::collections::BTreeSet;
 
 #[derive(Template)]
-#[template(path = "organiser_attention.html")]
+#[template(path = "organiser_overview.html")]
 struct Page {
     frame: Frame,
     head: DashboardHeader,
@@ -191,7 +191,7 @@ async fn wrong_passwords(app: &App) -> Result<Option<Item>, Problem> {
     }))
 }
 
-async fn request_items(app: &App) -> Result<Vec<Item>, Problem> {
+async fn registration_and_question_items(app: &App) -> Result<Vec<Item>, Problem> {
     let mut items = Vec::new();
     let registrations = app.store.registrations().await?;
     let waiting = registrations
@@ -376,7 +376,7 @@ pub(super) async fn page(
         items.extend(found);
         stages.push(summary);
     }
-    items.extend(request_items(&app).await?);
+    items.extend(registration_and_question_items(&app).await?);
     items.extend(tournament_items(&app).await?);
     // Problems first; the sort is stable.
     items.sort_by_key(|item| item.class != "bad");
