@@ -78,7 +78,7 @@ fn pictures_of_pages_are_taken() {
     let clip = faceoff_replay::Clip::read(&compressed.finish().expect("memory can be written"));
     let clip = clip.expect("it is a clip");
     let mut contacts = clip.header.contacts.iter();
-    let strike = contacts.rfind(|contact| contact.what == ContactWith::Mallet);
+    let strike = contacts.rfind(|contact| contact.body == ContactWith::Mallet);
     // The address of a replay names its control step and its camera.
     let step = (strike.expect("a goal was struck").t / clip.header.step_s).ceil();
     let page = path.replace("/api/v1", "");

@@ -2,13 +2,13 @@
 //! follows from penalty points: deployable, improvable or non-deployable.
 
 mod address;
-mod course;
 mod day_progress;
 mod days;
 pub(super) mod embedded;
 mod front;
 mod info;
 mod rows;
+mod score_history;
 mod sort;
 
 use super::{
@@ -19,7 +19,6 @@ use crate::{assets, chart::TeamsChart, query::with_query};
 use address::Address;
 use askama::Template;
 use axum::{extract::State, response::Response};
-use course::Course;
 use day_progress::DayProgress;
 use days::Days;
 use faceoff_api::{
@@ -37,6 +36,7 @@ use faceoff_types::{Competition, Task};
 use front::FrontPage;
 use info::BoardInfo;
 use rows::{Context, Group, OverallRow, TaskRow, common_conditions};
+use score_history::ScoreHistory;
 use sort::Sort;
 use std::sync::Arc;
 
@@ -65,7 +65,7 @@ struct OverallPage {
     /// For cards that show a link.
     description: String,
     style: &'static str,
-    course: Option<TeamsChart>,
+    score_history: Option<TeamsChart>,
     downloads: Downloads,
     /// BLAKE3 hash of the season's secret, from which all episodes are drawn.
     commitment: String,
@@ -148,9 +148,10 @@ pub(super) async fn overall(
     let today = today.day(app.config.clock.now());
     let timeline = BoardTimeline::load(&app, &visibility, &board, query.live).await?;
     let days = Days::new(&board, &timeline, &address);
-    let course = Course::load(&app, &visibility, &board, (days.shown, query.live)).await?;
+    let score_history =
+        ScoreHistory::load(&app, &visibility, &board, (days.shown, query.live)).await?;
     let previous = timeline.previous_board.as_ref();
-    let context = Context::new(&board, previous, &course, sort.is_by_rank());
+    let context = Context::new(&board, previous, &score_history, sort.is_by_rank());
     let groups = context.groups(|row| OverallRow::new(row, &context, &board.weights, &competition));
     let front = match query == BoardPageQuery::default() {
         true => {
@@ -165,7 +166,7 @@ pub(super) async fn overall(
         description: description(&competition, front.as_ref()),
         front,
         style: assets::FRONT_STYLE.url(),
-        course: course.chart(&board),
+        score_history: score_history.chart(&board),
         downloads: Downloads::new(&board, &query),
         commitment: season.commitment,
         competition: competition.short_title.clone(),
@@ -219,7 +220,7 @@ struct TaskPage {
     drawing: String,
     commitment: String,
     styles: [&'static str; 2],
-    course: Option<TeamsChart>,
+    score_history: Option<TeamsChart>,
     downloads: Downloads,
     /// Profile, episodes and rules of all rows; `None` if rows differ.
     conditions: Option<String>,
@@ -261,12 +262,13 @@ pub(super) async fn by_task(
     sort.apply(&mut board.rows, Some(task));
     let timeline = BoardTimeline::load(&app, &visibility, &board, query.live).await?;
     let days = Days::new(&board, &timeline, &address);
-    let course = Course::load(&app, &visibility, &board, (days.shown, query.live)).await?;
+    let score_history =
+        ScoreHistory::load(&app, &visibility, &board, (days.shown, query.live)).await?;
     let previous = timeline.previous_board.as_ref();
-    let context = Context::new(&board, previous, &course, sort.is_by_rank());
+    let context = Context::new(&board, previous, &score_history, sort.is_by_rank());
     render_with_etag(&TaskPage {
         styles: [assets::FRONT_STYLE.url(), assets::TASK_BOARD_STYLE.url()],
-        course: course.chart(&board),
+        score_history: score_history.chart(&board),
         downloads: Downloads::new(&board, &query),
         commitment: season.commitment,
         drawing: info.drawing.clone(),

@@ -91,7 +91,7 @@ pub(super) fn plain_end(summary: &EpisodeLine, contacts: &[Contact]) -> String {
 /// Why a shot came back, from what the puck hit last in the opponent's half.
 fn missed_shot_text(contacts: &[Contact]) -> String {
     let last = contacts.iter().rfind(|contact| contact.x > 0.0);
-    let cause = match last.map(|contact| (contact.what, contact.x)) {
+    let cause = match last.map(|contact| (contact.body, contact.x)) {
         Some((ContactWith::OpponentMallet, _)) => "the opponent returned it",
         // The puck's centre stays one radius from the rim.
         Some((ContactWith::Rim, x)) if x > TABLE.half_length_m() - 2.0 * PUCK.radius_m => {
@@ -134,9 +134,9 @@ mod tests {
 
     #[test]
     fn missed_shot_names_what_it_hit_last() {
-        let hit = |what, x| Contact {
+        let hit = |body, x| Contact {
             t: 1.0,
-            what,
+            body,
             x,
             y: 0.2,
         };

@@ -40,7 +40,7 @@ struct TaskFigures {
     successes: u32,
     episodes: u32,
     penalty_points: String,
-    per_episode: String,
+    points_per_episode: String,
     /// `None` in a competition without tiers.
     tier: Option<Tier>,
     /// Probability that other episodes of the same kind would give another tier; empty without tiers.
@@ -78,7 +78,7 @@ impl TaskFigures {
             successes: result.successes,
             episodes: result.episodes,
             penalty_points: format::one_decimal(result.penalty_points),
-            per_episode: format::per_episode(result.penalty_points, result.episodes),
+            points_per_episode: format::points_per_episode(result.penalty_points, result.episodes),
             tier: result.tier,
             tier_change: tier_change(summary, Some(task)),
             details: TaskDetails::new(result, competition),

@@ -169,7 +169,7 @@ pub(super) fn precise_milliseconds(seconds: f64) -> String {
 }
 
 /// Penalty points per episode, which decide the tier.
-pub(super) fn per_episode(points: f64, episodes: u32) -> String {
+pub(super) fn points_per_episode(points: f64, episodes: u32) -> String {
     format!("{:.2}", points / f64::from(episodes.max(1)))
 }
 
@@ -280,7 +280,7 @@ mod tests {
         assert_eq!(milliseconds(0.000_212), "0.21");
         assert_eq!(milliseconds(0.0204), "20");
         assert_eq!(precise_milliseconds(0.000_021_4), "0.021");
-        assert_eq!(per_episode(327.5, 1000), "0.33");
+        assert_eq!(points_per_episode(327.5, 1000), "0.33");
         assert_eq!(probability(0.0), "under 0.05 %");
         assert_eq!(probability(0.0005), "0.1 %");
         assert_eq!(probability(0.4025), "40.2 %");

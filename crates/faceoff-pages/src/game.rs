@@ -1,4 +1,4 @@
-//! `/games/{id}`: a game of a tournament between the agents of two teams: live view, result, course, analysis and replay.
+//! `/games/{id}`: a game of a tournament between the agents of two teams: live view, result, timeline, analysis and replay.
 
 mod analysis;
 mod live;
@@ -48,7 +48,7 @@ struct GameResult {
     statistics: Vec<Statistic>,
 }
 
-/// Course and analysis of a game, from its clips.
+/// Timeline and analysis of a game, from its clips.
 struct GameSections {
     timeline: ScoreTimeline,
     possession: Possession,
@@ -265,7 +265,7 @@ fn state_text(status: &GameStatus, is_hidden: bool) -> String {
         GameStatus::Played { finished_at, .. } => {
             format!("Played on {}.", finished_at.strftime("%Y-%m-%d, %H:%M UTC"))
         }
-        GameStatus::Broken { reason, .. } => {
+        GameStatus::PlatformFailed { reason, .. } => {
             format!("Failed because of a platform fault: {reason}")
         }
         // The reason is free text and may reveal the result.

@@ -165,7 +165,7 @@ impl Analyzer {
 
     /// Adds a contact of the puck.
     fn add_contact(&mut self, contact: &Contact) {
-        let side = match contact.what {
+        let side = match contact.body {
             ContactWith::Rim => return,
             ContactWith::Mallet => 0,
             ContactWith::OpponentMallet => 1,
@@ -218,7 +218,7 @@ impl Analyzer {
     }
 
     fn end_rally(&mut self, end: &RallyEndEvent) {
-        let scoring_side = (end.what == RallyEndKind::Goal)
+        let scoring_side = (end.kind == RallyEndKind::Goal)
             .then_some(end.by)
             .flatten()
             .map(|by| usize::from(by == 1));
@@ -302,15 +302,15 @@ mod tests {
     }
 
     /// A contact of the puck at time `t` (s) and position `x` (m).
-    fn contact(t: f64, what: ContactWith, x: f64) -> Contact {
-        Contact { t, what, x, y: 0.1 }
+    fn contact(t: f64, body: ContactWith, x: f64) -> Contact {
+        Contact { t, body, x, y: 0.1 }
     }
 
     /// A goal of the side `by`.
     fn goal(sample: u32, by: u32) -> RallyEndEvent {
         RallyEndEvent {
             sample,
-            what: RallyEndKind::Goal,
+            kind: RallyEndKind::Goal,
             by: Some(by),
             score: [1, 0],
         }

@@ -217,7 +217,7 @@ impl<W: Write> GameSink for GameClipRecorder<W> {
             chunk.score[1] = row.score;
             chunk.rally_ends.push(RallyEndEvent {
                 sample: chunk.last,
-                what: rally_end_kind(row.ending),
+                kind: rally_end_kind(row.ending),
                 by: row
                     .ending
                     .responsible_side()

@@ -110,7 +110,8 @@ pub struct ColumnHeader {
 pub struct Contact {
     /// Time since sample 0 of the episode or game, s.
     pub t: f64,
-    pub what: ContactWith,
+    #[serde(rename = "what")]
+    pub body: ContactWith,
     /// True x of the puck at that time, m, table frame.
     pub x: f64,
     /// True y of the puck at that time, m, table frame.
@@ -149,7 +150,8 @@ pub struct ViolationSpan {
 pub struct RallyEndEvent {
     /// The rally's last sample.
     pub sample: u32,
-    pub what: RallyEndKind,
+    #[serde(rename = "what")]
+    pub kind: RallyEndKind,
     /// The side that scored or committed the foul, 0 or 1.
     pub by: Option<u32>,
     /// The score after the rally.

@@ -129,12 +129,12 @@ impl Motion {
                 ContactBody::Mallet(_) => ContactWith::OpponentMallet,
             };
             let is_same_bounce =
-                |earlier: &Contact| earlier.what == body && t - earlier.t < BOUNCE_S;
+                |earlier: &Contact| earlier.body == body && t - earlier.t < BOUNCE_S;
             if !self.contacts.iter().rev().any(is_same_bounce) {
                 let [x, y] = impact.puck;
                 self.contacts.push(Contact {
                     t: rounded(t, 1e3),
-                    what: body,
+                    body,
                     x: rounded(x, 1e4),
                     y: rounded(y, 1e4),
                 });

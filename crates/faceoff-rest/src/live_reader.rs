@@ -271,7 +271,7 @@ impl LiveReader {
             GameState::Queued => StoredState::Unfinished(None),
             GameState::Running { attempt, .. } => StoredState::Unfinished(Some(attempt)),
             GameState::Played(_) => StoredState::Over(LiveEndState::Played),
-            GameState::PlatformFailed { .. } => StoredState::Over(LiveEndState::Broken),
+            GameState::PlatformFailed { .. } => StoredState::Over(LiveEndState::PlatformFailed),
             GameState::Void { .. } => StoredState::Over(LiveEndState::Void),
             GameState::Cancelled { .. } => StoredState::Over(LiveEndState::Cancelled),
         })

@@ -120,7 +120,7 @@ pub struct BoardSort {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BoardColumn {
     /// Board order: by tier, then by score.
-    Place,
+    Rank,
     /// The team's name.
     Team,
     /// The overall score; on a task's board the success rate.
@@ -135,7 +135,7 @@ impl BoardColumn {
     /// The column's name in a query.
     pub fn as_str(&self) -> &str {
         match self {
-            Self::Place => "place",
+            Self::Rank => "place",
             Self::Team => "team",
             Self::Score => "score",
             Self::Task(task) => task.as_str(),
@@ -145,7 +145,7 @@ impl BoardColumn {
 
     /// The column with this name; others than those of every board are named like their task.
     fn from_name(name: &str) -> Option<Self> {
-        let of_every_board = [Self::Place, Self::Team, Self::Score, Self::Points];
+        let of_every_board = [Self::Rank, Self::Team, Self::Score, Self::Points];
         let found = of_every_board
             .into_iter()
             .find(|column| column.as_str() == name);

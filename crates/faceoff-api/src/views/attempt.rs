@@ -32,7 +32,8 @@ pub enum AttemptOutcomeView {
     /// A result. It counts unless it is voided.
     Played,
     /// A platform fault.
-    Broken,
+    #[serde(rename = "broken")]
+    PlatformFailed,
     /// The slot was shut down or lacked disk space. The attempt does not count towards the game's limit of attempts.
     GivenBack,
     /// The slot's process ended, or its lease expired.

@@ -20,7 +20,8 @@ pub enum LiveEndState {
     /// It has a result.
     Played,
     /// It was given up after a platform fault.
-    Broken,
+    #[serde(rename = "broken")]
+    PlatformFailed,
     /// An organiser voided its result.
     Void,
     /// It is not played.

@@ -132,12 +132,12 @@ fn contacts_are_near_the_neighbouring_samples() {
                         "{task} {episode}: {contact:?} is {distance} m from a neighbouring sample"
                     );
                 }
-                if contact.what == ContactWith::Rim {
+                if contact.body == ContactWith::Rim {
                     // The rims are at |y| = 0.52 m and |x| = 0.97 m; the puck's radius is 0.03 m.
                     let is_near_rim = contact.y.abs() > 0.45 || contact.x.abs() > 0.9;
                     assert!(is_near_rim, "{contact:?}");
                 }
-                bodies.push(contact.what);
+                bodies.push(contact.body);
             }
             assert!(motion.header.contacts.is_sorted_by(|a, b| a.t <= b.t));
         }

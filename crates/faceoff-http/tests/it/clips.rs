@@ -52,7 +52,7 @@ pub(crate) fn record_clips(folder: &std::path::Path) -> PathBuf {
         let mut running =
             RunningEpisode::begin(&setup, PREPARE, episode, layout, &mut clips).unwrap();
         // Entries 6 to 12 of an observation are the joint positions.
-        let joint_positions = running.question().unwrap().observation[6..13].to_vec();
+        let joint_positions = running.action_request().unwrap().observation[6..13].to_vec();
         let outcome = loop {
             if episode == EPISODES - 1 && running.steps() == 3 {
                 let fault = AgentFaultKind::NotJson {

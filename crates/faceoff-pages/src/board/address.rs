@@ -33,7 +33,7 @@ impl<'a> Address<'a> {
     }
 
     pub(super) fn with_sort(&self, sort: BoardSort) -> String {
-        let is_default = sort.column == BoardColumn::Place && !sort.is_reversed;
+        let is_default = sort.column == BoardColumn::Rank && !sort.is_reversed;
         let sort = (!is_default).then_some(sort);
         address(&self.path, self.query, self.query.day, sort)
     }
@@ -79,7 +79,7 @@ mod tests {
             "/?division=Bachelor+students&day=2026-03-02"
         );
         let by_rank = BoardSort {
-            column: BoardColumn::Place,
+            column: BoardColumn::Rank,
             is_reversed: false,
         };
         assert_eq!(

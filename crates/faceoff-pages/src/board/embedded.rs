@@ -1,8 +1,8 @@
 //! `/embed`: the first teams of the newest board, to embed in other sites.
 
 use super::{
-    course::Course,
     rows::{Context, Group, OverallRow},
+    score_history::ScoreHistory,
 };
 use crate::{
     assets,
@@ -41,8 +41,8 @@ pub(crate) async fn page(State(app): State<App>) -> Result<Response, PageProblem
     let competition = Arc::clone(app.config.competition());
     let visibility = Visibility::load(&app, Viewer::Visitor).await?;
     let board = board::query(&app, &visibility, BoardQuery::default(), None).await?;
-    let course = Course::default();
-    let context = Context::new(&board, None, &course, true);
+    let score_history = ScoreHistory::default();
+    let context = Context::new(&board, None, &score_history, true);
     let mut groups =
         context.groups(|row| OverallRow::new(row, &context, &board.weights, &competition));
     let mut left = MAX_TEAMS;

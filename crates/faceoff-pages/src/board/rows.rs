@@ -1,6 +1,6 @@
 //! Rows of a board as text, grouped by tier if the competition has tiers.
 
-use super::course::{Course, Sparkline};
+use super::score_history::{ScoreHistory, Sparkline};
 use crate::{
     board_status::shared_rank,
     format::{self, Rate, TierLabel},
@@ -98,7 +98,7 @@ pub(super) struct Context<'a> {
     board: &'a BoardView,
     /// The board of the day before.
     earlier: Option<&'a EarlierBoard>,
-    course: &'a Course,
+    score_history: &'a ScoreHistory,
     has_common_conditions: bool,
     is_by_rank: bool,
     /// The first team of each rank group with several teams.
@@ -110,7 +110,7 @@ impl<'a> Context<'a> {
     pub(super) fn new(
         board: &'a BoardView,
         earlier: Option<&'a EarlierBoard>,
-        course: &'a Course,
+        score_history: &'a ScoreHistory,
         is_by_rank: bool,
     ) -> Self {
         let mut groups: BTreeMap<u32, Vec<&BoardRow>> = BTreeMap::new();
@@ -125,7 +125,7 @@ impl<'a> Context<'a> {
         Self {
             board,
             earlier,
-            course,
+            score_history,
             has_common_conditions: common_conditions(&board.rows).is_some(),
             is_by_rank,
             leaders: leaders.collect(),
@@ -175,7 +175,7 @@ impl<'a> Context<'a> {
         let tier_change = row.tier_change_probability;
         TeamCell {
             rank: shared_rank(&self.board.rows, row),
-            sparkline: self.course.sparkline(row.team_id),
+            sparkline: self.score_history.sparkline(row.team_id),
             change: self.change(row),
             tied_with: self.tied_with(row),
             tier_change: tier_change
@@ -228,7 +228,7 @@ pub(super) struct OverallRow {
     /// In the competition's order; `None`: task not played.
     pub(super) rates: Vec<(Task, Option<Rate>)>,
     pub(super) penalty_points: String,
-    pub(super) per_episode: String,
+    pub(super) points_per_episode: String,
 }
 
 impl OverallRow {
@@ -246,7 +246,10 @@ impl OverallRow {
                 .map(|task| (task, row.tasks.get(&task).map(Rate::new)))
                 .collect(),
             penalty_points: format::one_decimal(row.penalty_points),
-            per_episode: format::per_episode(row.penalty_points, episodes_per_day(row)),
+            points_per_episode: format::points_per_episode(
+                row.penalty_points,
+                episodes_per_day(row),
+            ),
         }
     }
 }
@@ -256,7 +259,7 @@ pub(super) struct TaskRow {
     pub(super) team: TeamCell,
     pub(super) rate: Rate,
     pub(super) penalty_points: String,
-    pub(super) per_episode: String,
+    pub(super) points_per_episode: String,
     pub(super) details: Option<TaskDetails>,
 }
 
@@ -296,7 +299,10 @@ impl TaskRow {
             team: context.team_cell(row),
             rate: Rate::new(result),
             penalty_points: format::one_decimal(result.penalty_points),
-            per_episode: format::per_episode(result.penalty_points, per_day(row, result.episodes)),
+            points_per_episode: format::points_per_episode(
+                result.penalty_points,
+                per_day(row, result.episodes),
+            ),
             details: TaskDetails::new(result, competition),
         }
     }
@@ -336,8 +342,8 @@ mod tests {
     type TextGroup = (Option<Tier>, Vec<String>, Vec<Option<Tier>>);
 
     fn groups(board: &BoardView, is_by_rank: bool) -> Vec<TextGroup> {
-        let course = Course::default();
-        let context = Context::new(board, None, &course, is_by_rank);
+        let score_history = ScoreHistory::default();
+        let context = Context::new(board, None, &score_history, is_by_rank);
         let groups = context.groups(|row| context.team_cell(row));
         let summary = |group: Group<TeamCell>| {
             let teams = group.rows.iter().map(|cell| cell.team.clone()).collect();

@@ -43,7 +43,7 @@ fn columns(
         None => ("Score", &competition.tasks[..]),
     };
     let mut columns = vec![
-        (BoardColumn::Place, "#", "", "rank"),
+        (BoardColumn::Rank, "#", "", "rank"),
         (BoardColumn::Team, "Team", "", ""),
         (BoardColumn::Score, score, "percent", "number"),
     ];
@@ -75,7 +75,7 @@ impl Sort {
         competition: &Competition,
     ) -> Result<Self, Problem> {
         let by_rank = BoardSort {
-            column: BoardColumn::Place,
+            column: BoardColumn::Rank,
             is_reversed: false,
         };
         let key = query.sort.unwrap_or(by_rank);
@@ -114,7 +114,7 @@ impl Sort {
 
     /// The default: by rank, grouped by tier if there are tiers.
     pub(super) fn is_by_rank(&self) -> bool {
-        self.key.column == BoardColumn::Place && !self.key.is_reversed
+        self.key.column == BoardColumn::Rank && !self.key.is_reversed
     }
 
     /// Equal rows keep the order of the board.
@@ -132,7 +132,7 @@ impl Sort {
 
 const fn is_ascending_by_default(column: BoardColumn) -> bool {
     match column {
-        BoardColumn::Place | BoardColumn::Team | BoardColumn::Points => true,
+        BoardColumn::Rank | BoardColumn::Team | BoardColumn::Points => true,
         BoardColumn::Score | BoardColumn::Task(_) => false,
     }
 }
@@ -148,7 +148,7 @@ fn compare(column: BoardColumn, task: Option<Task>, a: &BoardRow, b: &BoardRow) 
         None => row.penalty_points,
     };
     match (column, task) {
-        (BoardColumn::Place, _) => a.rank.cmp(&b.rank),
+        (BoardColumn::Rank, _) => a.rank.cmp(&b.rank),
         (BoardColumn::Team, _) => {
             let name = |row: &BoardRow| row.team.as_str().to_lowercase();
             name(a).cmp(&name(b))

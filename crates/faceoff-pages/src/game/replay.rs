@@ -1,4 +1,4 @@
-//! The replay of a game on its page and alone, to embed in other sites: addresses of the recording, and the course of the game, from
+//! The replay of a game on its page and alone, to embed in other sites: addresses of the recording, and the events of the game, from
 //! which the script draws the time line before it has loaded any part of the recording.
 
 use crate::{
@@ -34,7 +34,7 @@ pub(super) struct GameReplay {
     /// Control steps of the game, plus one.
     pub(super) samples: u32,
     /// Ends of rallies and violations of the whole game as JSON; `None` if results are hidden.
-    pub(super) course: Option<String>,
+    pub(super) events_json: Option<String>,
     /// Is the replay embedded in another site?
     pub(super) is_embedded: bool,
 }
@@ -108,20 +108,20 @@ impl GameReplay {
             observed_url: visible_side
                 .map(|side| format!("{api}/sides/{}/observed/{{chunk}}", side.number())),
             samples: steps.saturating_add(1),
-            course: analysis.map(course),
+            events_json: analysis.map(events_json),
             is_embedded: false,
         }
     }
 }
 
-/// The course of a game as the script reads it: each end of a rally as `[sample, what, side, score, score]`, and each range of
+/// The events of a game as the script reads them: each end of a rally as `[sample, kind, side, score, score]`, and each range of
 /// violations as `[first sample, last sample, side, constraints, number]`.
-fn course(analysis: &GameAnalysis) -> String {
+fn events_json(analysis: &GameAnalysis) -> String {
     let ends = analysis
         .rally_ends
         .iter()
-        .filter(|end| end.what != RallyEndKind::GameOver)
-        .map(|end| json!([end.sample, end.what, end.by, end.score[0], end.score[1]]));
+        .filter(|end| end.kind != RallyEndKind::GameOver)
+        .map(|end| json!([end.sample, end.kind, end.by, end.score[0], end.score[1]]));
     let violations = violation_ranges(&analysis.violations)
         .into_iter()
         .map(|range| {

@@ -1,4 +1,4 @@
-//! Course of a game. A game consists of rallies; a rally ends with a goal, with a foul, or without a result, such as with a stuck puck.
+//! Timeline of the score of a game. A game consists of rallies; a rally ends with a goal, with a foul, or without a result, such as with a stuck puck.
 //! The page shows a chart of the score over time, the ends of rallies as a table, and the paths of the puck into the goals.
 
 use super::live::{game_clock, replay_link};
@@ -34,14 +34,14 @@ impl ScoreTimeline {
             goals.map(|goal| path(&goal.positions)).collect()
         });
         let changes_score =
-            |end: &&RallyEndEvent| matches!(end.what, RallyEndKind::Goal | RallyEndKind::Foul);
+            |end: &&RallyEndEvent| matches!(end.kind, RallyEndKind::Goal | RallyEndKind::Foul);
         let rows: Vec<Row> = rally_ends
             .iter()
-            .filter(|end| end.what != RallyEndKind::GameOver)
+            .filter(|end| end.kind != RallyEndKind::GameOver)
             .map(|end| Row {
                 time: game_clock(end.sample),
                 link: replay_link(end.sample),
-                event: end_label(end.what),
+                event: end_label(end.kind),
                 team: match end.by {
                     Some(0) => teams[0].clone(),
                     Some(_) => teams[1].clone(),
@@ -54,7 +54,7 @@ impl ScoreTimeline {
             chart: ScoreChart::new(
                 *steps,
                 rally_ends.iter().filter(changes_score).map(|end| {
-                    let foul_by = (end.what == RallyEndKind::Foul)
+                    let foul_by = (end.kind == RallyEndKind::Foul)
                         .then_some(end.by)
                         .flatten()
                         .map(|side| usize::from(side == 1));
@@ -75,8 +75,8 @@ impl ScoreTimeline {
     }
 }
 
-const fn end_label(what: RallyEndKind) -> &'static str {
-    match what {
+const fn end_label(kind: RallyEndKind) -> &'static str {
+    match kind {
         RallyEndKind::Goal => "goal",
         RallyEndKind::Foul => "foul",
         RallyEndKind::Stuck => "stuck in the middle",

@@ -51,7 +51,7 @@ pub(super) struct DayResult {
     /// In the competition's order; `None`: task not played.
     pub(super) rates: Vec<Option<Rate>>,
     pub(super) penalty_points: String,
-    pub(super) per_episode: String,
+    pub(super) points_per_episode: String,
 }
 
 impl DayResult {
@@ -71,7 +71,7 @@ impl DayResult {
                 .map(|task| row.tasks.get(&task).map(Rate::new))
                 .collect(),
             penalty_points: format::one_decimal(row.penalty_points),
-            per_episode: format!("{:.2}", points_per_episode(row)),
+            points_per_episode: format!("{:.2}", points_per_episode(row)),
         }
     }
 }

@@ -9,7 +9,7 @@ use faceoff_store::{AttemptOutcome, GameAttempt};
 pub fn view(attempt: GameAttempt) -> GameAttemptView {
     let end = attempt.end.as_ref().map(|end| match end.outcome {
         AttemptOutcome::Played => AttemptOutcomeView::Played,
-        AttemptOutcome::PlatformFailed => AttemptOutcomeView::Broken,
+        AttemptOutcome::PlatformFailed => AttemptOutcomeView::PlatformFailed,
         AttemptOutcome::Released => AttemptOutcomeView::GivenBack,
         AttemptOutcome::Lost => AttemptOutcomeView::Lost,
         AttemptOutcome::Cancelled => AttemptOutcomeView::CalledOff,

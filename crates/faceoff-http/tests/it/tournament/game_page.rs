@@ -39,9 +39,9 @@ fn record_game_clips() -> Vec<u8> {
         running.start_rally(readiness).unwrap();
         while running.is_in_rally() {
             let actions = Side::BOTH.map(|side| {
-                let question = running.question(side).unwrap().unwrap();
+                let request = running.action_request(side).unwrap().unwrap();
                 // Entries 6 to 12 of an observation are the joint positions.
-                question.observation[6..13].to_vec()
+                request.observation[6..13].to_vec()
             });
             let timing = AnswerTiming {
                 computation_time_s: 0.001,

@@ -153,7 +153,9 @@ impl EventPrinter {
                 self.is_over = true;
                 let state = match end.state {
                     LiveEndState::Played => "over",
-                    LiveEndState::Broken => "over without a result, because of a platform fault",
+                    LiveEndState::PlatformFailed => {
+                        "over without a result, because of a platform fault"
+                    }
                     LiveEndState::Void => "over, result voided",
                     LiveEndState::Cancelled => "cancelled",
                 };

@@ -65,7 +65,7 @@ fn state_text(game: &GameView) -> String {
     let mut text = match &game.status {
         GameStatus::Queued => "queued".to_owned(),
         GameStatus::Running { attempt, .. } => format!("running, attempt {attempt}"),
-        GameStatus::Broken { reason, .. } => format!("platform fault: {reason}"),
+        GameStatus::PlatformFailed { reason, .. } => format!("platform fault: {reason}"),
         GameStatus::Void { reason, .. } => format!("void: {reason}"),
         GameStatus::Cancelled { reason, .. } => format!("cancelled: {reason}"),
         GameStatus::Played { result, .. } => {
@@ -140,7 +140,7 @@ pub(in crate::commands) fn attempts_text(attempts: &[GameAttemptView]) -> String
             (Some(end), Some(ended_at)) => {
                 let outcome = match end {
                     AttemptOutcomeView::Played => "finished",
-                    AttemptOutcomeView::Broken => "platform fault",
+                    AttemptOutcomeView::PlatformFailed => "platform fault",
                     AttemptOutcomeView::GivenBack => "released by its slot",
                     AttemptOutcomeView::Lost => "lost with its slot",
                     AttemptOutcomeView::CalledOff => "cancelled",

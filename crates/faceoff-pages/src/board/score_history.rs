@@ -1,4 +1,4 @@
-//! The course of all teams over the days of a board: a line in each row, and a chart of all together.
+//! The scores of all teams over the days of a board: as a sparkline in each row, and as a chart of all teams.
 
 use crate::{chart::TeamsChart, format};
 use faceoff_api::views::board::BoardView;
@@ -17,7 +17,7 @@ const MARGIN: f64 = 2.0;
 
 /// The scores of each team on the days of the board.
 #[derive(Default)]
-pub(super) struct Course {
+pub(super) struct ScoreHistory {
     teams: BTreeMap<TeamId, Vec<(Date, f64)>>,
 }
 
@@ -30,7 +30,7 @@ pub(super) struct Sparkline {
     pub(super) description: String,
 }
 
-impl Course {
+impl ScoreHistory {
     /// `day`: the board's own; `None` before the first result.
     pub(super) async fn load(
         app: &AppState,
@@ -38,9 +38,9 @@ impl Course {
         board: &BoardView,
         (day, is_live): (Option<Date>, bool),
     ) -> Result<Self, Problem> {
-        let mut course = Self::default();
+        let mut score_history = Self::default();
         let Some(day) = day.filter(|_| !visibility.is_hidden(board.stage)) else {
-            return Ok(course);
+            return Ok(score_history);
         };
         let frozen = board.frozen.as_ref().filter(|_| !is_live);
         let scope = BoardScope {
@@ -58,9 +58,13 @@ impl Course {
             if !shown.contains(&team) {
                 continue;
             }
-            course.teams.entry(team).or_default().push((day, score));
+            score_history
+                .teams
+                .entry(team)
+                .or_default()
+                .push((day, score));
         }
-        Ok(course)
+        Ok(score_history)
     }
 
     /// First and last day of all teams, if there are several.
@@ -124,13 +128,13 @@ mod tests {
     use super::*;
     use jiff::civil::date;
 
-    fn course(scores: &[(u128, i8, f64)]) -> Course {
-        let mut course = Course::default();
+    fn score_history(scores: &[(u128, i8, f64)]) -> ScoreHistory {
+        let mut score_history = ScoreHistory::default();
         for (team, day, score) in scores {
-            let scores = course.teams.entry(team_id(*team)).or_default();
+            let scores = score_history.teams.entry(team_id(*team)).or_default();
             scores.push((date(2026, 3, *day), *score));
         }
-        course
+        score_history
     }
 
     fn team_id(number: u128) -> TeamId {
@@ -140,20 +144,25 @@ mod tests {
 
     #[test]
     fn sparklines_share_days_and_scores() {
-        let course = course(&[(1, 1, 20.0), (1, 3, 60.0), (2, 2, 40.0), (2, 3, 40.0)]);
-        let path = |team| course.sparkline(team_id(team)).unwrap().path;
+        let score_history =
+            score_history(&[(1, 1, 20.0), (1, 3, 60.0), (2, 2, 40.0), (2, 3, 40.0)]);
+        let path = |team| score_history.sparkline(team_id(team)).unwrap().path;
         assert_eq!(path(1), "M2.0 18.0L70.0 2.0");
         assert_eq!(path(2), "M36.0 10.0L70.0 10.0");
         assert_eq!(
-            course.sparkline(team_id(1)).unwrap().description,
+            score_history.sparkline(team_id(1)).unwrap().description,
             "1 March: 20.0, 3 March: 60.0"
         );
     }
 
     #[test]
     fn single_day_has_no_line() {
-        assert!(course(&[(1, 1, 20.0)]).sparkline(team_id(1)).is_none());
-        let joined_late = course(&[(1, 1, 20.0), (1, 2, 20.0), (2, 2, 5.0)]);
+        assert!(
+            score_history(&[(1, 1, 20.0)])
+                .sparkline(team_id(1))
+                .is_none()
+        );
+        let joined_late = score_history(&[(1, 1, 20.0), (1, 2, 20.0), (2, 2, 5.0)]);
         assert!(joined_late.sparkline(team_id(2)).is_none());
         assert!(joined_late.sparkline(team_id(1)).is_some());
     }
