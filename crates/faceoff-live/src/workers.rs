@@ -21,7 +21,7 @@ pub struct Workers(Arc<Mutex<WorkersState>>);
 #[derive(Debug, Default)]
 struct WorkersState {
     workers: BTreeMap<String, WorkerStatus>,
-    /// Tasks that the server cannot do for remote workers, with the causes.
+    /// Operations that the server cannot do for remote workers, with the causes.
     problems: BTreeMap<String, String>,
     /// Files of leased jobs that are being uploaded or are closed, by the nonce (unique number) of the lease.
     files: HashMap<Uuid, JobFiles>,
@@ -287,28 +287,32 @@ impl Workers {
         available.map(WorkerStatus::slots).sum()
     }
 
-    /// Sets the problem that prevents the server from doing a task for remote workers; `None`: it is solved.
-    pub fn set_problem(&self, task: &str, cause: Option<&str>) {
+    /// Sets the problem that prevents the server from doing an operation for remote workers; `None`: it is solved.
+    pub fn set_problem(&self, operation: &str, cause: Option<&str>) {
         let mut state = self.lock();
         match cause {
-            Some(cause) => drop(state.problems.insert(task.to_owned(), cause.to_owned())),
-            None => drop(state.problems.remove(task)),
+            Some(cause) => drop(
+                state
+                    .problems
+                    .insert(operation.to_owned(), cause.to_owned()),
+            ),
+            None => drop(state.problems.remove(operation)),
         }
     }
 
-    /// Does a problem prevent the server from doing this task?
+    /// Does a problem prevent the server from doing this operation?
     #[must_use]
-    pub fn has_problem(&self, task: &str) -> bool {
-        self.lock().problems.contains_key(task)
+    pub fn has_problem(&self, operation: &str) -> bool {
+        self.lock().problems.contains_key(operation)
     }
 
-    /// The tasks that the server cannot do for remote workers, with the causes.
+    /// The operations that the server cannot do for remote workers, with the causes.
     #[must_use]
     pub fn problems(&self) -> Vec<(String, String)> {
         let state = self.lock();
         let problems = state.problems.iter();
         problems
-            .map(|(task, cause)| (task.clone(), cause.clone()))
+            .map(|(operation, cause)| (operation.clone(), cause.clone()))
             .collect()
     }
 

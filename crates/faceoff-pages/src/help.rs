@@ -12,21 +12,21 @@ use faceoff_types::{AgentLimits, RuntimeContent};
 struct Page {
     frame: Frame,
     view: RuntimesView,
-    contests: Vec<Contest>,
+    columns: Vec<LimitsColumn>,
 }
 
 /// A column of the table of limits: a stage or a tournament.
-struct Contest {
+struct LimitsColumn {
     name: String,
     runtimes: String,
     limits: AgentLimits,
 }
 
 impl Page {
-    /// Rows of the table of limits: name, and a value per contest.
+    /// Rows of the table of limits: name, and a value per column.
     fn rows(&self) -> Vec<(&'static str, Vec<String>)> {
         let row = |name, value: fn(&AgentLimits) -> String| {
-            let values = self.contests.iter().map(|contest| value(&contest.limits));
+            let values = self.columns.iter().map(|column| value(&column.limits));
             (name, values.collect())
         };
         vec![
@@ -80,7 +80,7 @@ fn mebibytes(bytes: u64) -> String {
 pub(super) async fn page(State(app): State<App>) -> Result<Response, PageProblem> {
     let view = runtimes::build(&app).await?;
     let season = app.store.season().await?;
-    let stages = view.stages.iter().map(|stage| Contest {
+    let stages = view.stages.iter().map(|stage| LimitsColumn {
         name: match stage.phase {
             PhaseView::Upcoming => format!("{} (not open yet)", stage.name),
             PhaseView::Open | PhaseView::Closed => stage.name.to_string(),
@@ -88,14 +88,14 @@ pub(super) async fn page(State(app): State<App>) -> Result<Response, PageProblem
         runtimes: stage.runtimes.join(", "),
         limits: stage.limits.clone(),
     });
-    let tournaments = view.tournaments.iter().map(|tournament| Contest {
+    let tournaments = view.tournaments.iter().map(|tournament| LimitsColumn {
         name: tournament.name.to_string(),
         runtimes: tournament.runtimes.join(", "),
         limits: tournament.limits.clone(),
     });
     render(&Page {
         frame: Frame::for_app(&app, season.name, "/help"),
-        contests: stages.chain(tournaments).collect(),
+        columns: stages.chain(tournaments).collect(),
         view,
     })
 }

@@ -13,7 +13,7 @@ use std::iter;
 
 /// One position of each body per this number of samples: 25 per second of the episode.
 const SAMPLES_PER_FRAME: usize = 2;
-/// Still frames at the end of each turn.
+/// Still frames at the end of each loop.
 const FINAL_FRAMES: usize = 20;
 const SLOWDOWN: f64 = 2.0;
 
@@ -29,8 +29,8 @@ pub(super) struct HighlightLoop {
     pub(super) address: String,
     pub(super) table: TableOutline,
     pub(super) path: String,
-    /// Duration of one turn, s.
-    pub(super) turn_s: String,
+    /// Duration of one loop, s.
+    pub(super) loop_s: String,
     pub(super) bodies: Vec<Body>,
 }
 
@@ -70,7 +70,7 @@ impl HighlightLoop {
             address: replay::page_path(found.evaluation, highlight.task, highlight.episode),
             table: TableOutline::new(),
             path: table_drawing::path(&puck),
-            turn_s: format!(
+            loop_s: format!(
                 "{:.2}",
                 SLOWDOWN * motion.header.step_s * to_f64(SAMPLES_PER_FRAME * frames)
             ),

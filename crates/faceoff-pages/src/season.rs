@@ -26,7 +26,7 @@ struct Page {
 }
 
 impl Page {
-    /// Names of the tasks with the word that joins item `index` to the one before it.
+    /// Names of the tasks, each with the text that joins it to the one before: nothing, a comma, or “or”.
     fn tasks_of_seeds(&self) -> Vec<(&'static str, Task)> {
         let last = self.competition.tasks.len().saturating_sub(1);
         let joined = |(index, task)| match index {

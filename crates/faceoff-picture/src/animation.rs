@@ -130,9 +130,9 @@ impl Animation {
         let colours = rgb.chunks_exact(3);
         let indices: Vec<u8> = colours.map(|rgb| index([rgb[0], rgb[1], rgb[2]])).collect();
         let columns = usize::from(self.size[0]);
-        let part = match self.shown.is_empty() {
-            true => Part::all(self.size),
-            false => Part::changed(&self.shown, &indices, columns),
+        let region = match self.shown.is_empty() {
+            true => Region::all(self.size),
+            false => Region::changed(&self.shown, &indices, columns),
         };
         // Runs of unchanged pixels take little space.
         let unchanged = self.palette.unchanged();
@@ -155,12 +155,12 @@ impl Animation {
             .collect();
         let frame = Frame {
             delay: FRAME_TIME_CS,
-            left: part.left,
-            top: part.top,
-            width: part.width,
-            height: part.height,
+            left: region.left,
+            top: region.top,
+            width: region.width,
+            height: region.height,
             transparent: Some(unchanged),
-            buffer: part.cut(&written, columns).into(),
+            buffer: region.cut(&written, columns).into(),
             ..Frame::default()
         };
         self.shown = indices;
@@ -182,14 +182,14 @@ fn gif_error(error: impl ToString) -> PictureError {
 
 /// A rectangle of a picture, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Part {
+struct Region {
     left: u16,
     top: u16,
     width: u16,
     height: u16,
 }
 
-impl Part {
+impl Region {
     const fn all([width, height]: [u16; 2]) -> Self {
         Self {
             left: 0,
@@ -199,7 +199,7 @@ impl Part {
         }
     }
 
-    /// The smallest part in which two frames differ; one pixel if they are equal.
+    /// The smallest region in which two frames differ; one pixel if they are equal.
     fn changed(before: &[u8], after: &[u8], columns: usize) -> Self {
         let differing = before.iter().zip(after).enumerate();
         let differing = differing.filter(|(_, (before, after))| before != after);

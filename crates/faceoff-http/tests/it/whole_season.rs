@@ -17,10 +17,10 @@ async fn database_stays_small_with_twenty_teams_and_ninety_days() {
     let mut season = Season::start().await;
     let (mut largest_bytes, mut evaluations) = (0, 0);
     for day in 0..DAYS {
-        season.morning(day).await;
+        season.add_teams_and_submissions(day).await;
         season.perform_actions(day).await;
-        evaluations += season.evening(day).await;
-        season.night().await;
+        evaluations += season.run_evaluations(day).await;
+        season.run_clean_up().await;
         largest_bytes = largest_bytes.max(season.database_bytes());
     }
     season.sign_off().await;

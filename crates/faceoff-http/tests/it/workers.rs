@@ -126,11 +126,11 @@ async fn remote_workers_are_listed_with_jobs_and_problems() {
     workers.end_job(job);
     assert_eq!(worker_states(&worker_list().await), ["idle", "silent"]);
 
-    workers.set_problem("give out work", Some("no connection to <NATS>"));
+    workers.set_problem("publish jobs", Some("no connection to <NATS>"));
     let list = worker_list().await;
     assert_eq!(
         list["problems"],
-        json!(["The server cannot give out work: no connection to <NATS>"])
+        json!(["The server cannot publish jobs: no connection to <NATS>"])
     );
     for path in ["/organiser", "/organiser/workers"] {
         let html = dashboard_page(&grace.open(path).await, 200);

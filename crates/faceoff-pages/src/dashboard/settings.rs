@@ -70,7 +70,7 @@ struct TeamForm {
 }
 
 /// What was typed into a form that was refused.
-enum Refused {
+enum RefusedForm {
     UserName(String),
     Team(TeamForm),
 }
@@ -79,7 +79,7 @@ async fn page_with(
     app: &App,
     caller: &Caller,
     notice: Notice<'_>,
-    refused: Option<Refused>,
+    refused: Option<RefusedForm>,
 ) -> Result<Response, PageProblem> {
     let path = settings_path(caller);
     let current = caller.team().map(|team| TeamForm {
@@ -96,8 +96,8 @@ async fn page_with(
         team: current,
     };
     match refused {
-        Some(Refused::UserName(name)) => page.user_name = Some(name),
-        Some(Refused::Team(form)) => page.team = Some(form),
+        Some(RefusedForm::UserName(name)) => page.user_name = Some(name),
+        Some(RefusedForm::Team(form)) => page.team = Some(form),
         None => {}
     }
     render_dashboard(&page, notice)
@@ -142,7 +142,7 @@ async fn rename(
     match renamed {
         Ok(_) => Ok(redirect_done(settings_path(&caller), "user-renamed")),
         Err(problem) => {
-            let refused = Some(Refused::UserName(user_name));
+            let refused = Some(RefusedForm::UserName(user_name));
             page_with(&app, &caller, Notice::Refused(&problem), refused).await
         }
     }
@@ -199,7 +199,7 @@ async fn change_team(
         Ok(_) => Ok(redirect_done(settings_path(&member.caller), "team-changed")),
         Err(problem) => {
             let notice = Notice::Refused(&problem);
-            page_with(&app, &member.caller, notice, Some(Refused::Team(form))).await
+            page_with(&app, &member.caller, notice, Some(RefusedForm::Team(form))).await
         }
     }
 }

@@ -39,7 +39,7 @@ pub fn current(app: &AppState) -> WorkersView {
     let (workers, now) = (&app.live.workers, app.config.clock.now());
     let problems = workers.problems().into_iter();
     let problems =
-        problems.map(|(activity, error)| format!("The server cannot {activity}: {error}"));
+        problems.map(|(operation, error)| format!("The server cannot {operation}: {error}"));
     let all = workers.all();
     let stuck_jobs = all.iter().flat_map(stuck_jobs);
     let problems = problems.chain(stuck_jobs).collect();

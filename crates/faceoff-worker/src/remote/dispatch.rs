@@ -192,7 +192,7 @@ async fn resume_leases(server: &LocalServer) -> anyhow::Result<()> {
     }
 }
 
-/// Runs tasks until the shutdown and restarts them when they fail. Only changes are logged; current problems are shown to
+/// Runs operations until the shutdown and restarts them when they fail. Only changes are logged; current problems are shown to
 /// organisers.
 struct Supervisor<'a> {
     workers: &'a Workers,
@@ -200,10 +200,10 @@ struct Supervisor<'a> {
 }
 
 impl Supervisor<'_> {
-    /// Runs a task; `task` completes the phrase “the server cannot …”.
+    /// Runs an operation; `operation` completes the phrase “the server cannot …”.
     async fn run<F: Future<Output = anyhow::Result<()>>>(
         &self,
-        task: &str,
+        operation: &str,
         mut run: impl FnMut() -> F,
     ) {
         let mut logged_cause = String::new();
@@ -213,7 +213,7 @@ impl Supervisor<'_> {
             let result = match tokio::time::timeout(HEALTHY_AFTER, &mut running).await {
                 Ok(result) => result,
                 Err(_) => {
-                    self.workers.set_problem(task, None);
+                    self.workers.set_problem(operation, None);
                     logged_cause.clear();
                     running.await
                 }
@@ -223,11 +223,11 @@ impl Supervisor<'_> {
             };
             let cause = format!("{error:#}");
             if cause != logged_cause {
-                tracing::error!(cause, "cannot {task}; trying again");
+                tracing::error!(cause, "cannot {operation}; trying again");
                 // While NATS is unreachable, problems that follow from it are not shown.
                 let is_nats_down = self.workers.has_problem(REACH_NATS);
                 self.workers
-                    .set_problem(task, (!is_nats_down).then_some(&*cause));
+                    .set_problem(operation, (!is_nats_down).then_some(&*cause));
                 logged_cause = cause;
             }
             tokio::select! {

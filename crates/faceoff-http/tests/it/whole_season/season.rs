@@ -136,7 +136,7 @@ impl Season {
     }
 
     /// Adds the new teams of the day, and uploads new submissions.
-    pub async fn morning(&mut self, day: i32) {
+    pub async fn add_teams_and_submissions(&mut self, day: i32) {
         self.site.set_time(local_time(day, 10));
         let number = usize::try_from(day).unwrap();
         let team_count = (FIRST_TEAMS + number).min(TEAMS);
@@ -182,7 +182,7 @@ impl Season {
 
     /// Checks that the day starts at its cutoff and not a millisecond before, and runs its evaluations. Returns the number of
     /// scored evaluations.
-    pub async fn evening(&mut self, day: i32) -> usize {
+    pub async fn run_evaluations(&mut self, day: i32) -> usize {
         let stage = self.stage_of(day);
         let view = self.get(&format!("/stages/{stage}")).await;
         let cutoff: Timestamp = string(&view["next_cutoff"]["at"]).parse().unwrap();
@@ -223,7 +223,7 @@ impl Season {
     }
 
     /// The server's clean-up.
-    pub async fn night(&mut self) {
+    pub async fn run_clean_up(&mut self) {
         self.site.advance(9 * 3600);
         clean_up(
             &self.site.store,
