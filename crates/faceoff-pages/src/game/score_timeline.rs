@@ -1,5 +1,6 @@
-//! Timeline of the score of a game. A game consists of rallies; a rally ends with a goal, with a foul, or without a result, such as with a stuck puck.
-//! The page shows a chart of the score over time, the ends of rallies as a table, and the paths of the puck into the goals.
+//! Timeline of the score of a game. A game consists of rallies; a rally ends with a goal, with a foul, or without a result,
+//! such as with a stuck puck. The page shows a chart of the score over time, the ends of rallies as a table, and the paths of
+//! the puck into the goals.
 
 use super::live::{game_clock, replay_link};
 use crate::{chart::ScoreChart, table_drawing::path};

@@ -46,7 +46,7 @@ use tokio_util::sync::CancellationToken;
 pub(super) const POLL_INTERVAL: Duration = Duration::from_secs(1);
 /// Minimum interval between the starts of two attempts.
 const RETRY_INTERVAL: Duration = Duration::from_secs(1);
-/// A task that has run this long counts as healthy; requests to an unreachable NATS fail sooner.
+/// An operation that has run this long counts as healthy; requests to an unreachable NATS fail sooner.
 const HEALTHY_AFTER: Duration = Duration::from_secs(10);
 /// Minimum duration of the workers' leases at the start of the server, seconds: they could not be renewed while it was down.
 const MIN_LEASE_AT_START_S: u32 = 60;
