@@ -243,8 +243,7 @@ const fn ruleset(ruleset: AirHockeyRuleset) -> RulesetInfo {
     }
 }
 
-/// `weight` in millionths.
-/// A task, without the texts that describe it.
+/// A task without its descriptive texts. `weight` is in millionths.
 fn task(task: Task, title: &str, weight: u32) -> TaskInfo {
     TaskInfo {
         task,
@@ -268,7 +267,8 @@ fn profile(profile: Profile, letter: char, title: &str, description: &str) -> Pr
     }
 }
 
-/// The texts are title, breach, short heading and measure; the heading of columns is the breach.
+/// A violation of the rules. `breach` is the violation in words, and the heading of columns; `short` is a short heading, and `measure`
+/// the measured quantity with its unit.
 fn violation(
     name: ViolationName,
     [title, breach, short, measure]: [&str; 4],
@@ -330,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn rules_and_maps_follow_the_profiles() {
+    fn rules_are_checked_and_map_is_sorted_by_profile() {
         let competition = competition();
         let mut rules = StageRules {
             ruleset: RULESET,
@@ -353,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn hash_covers_rules_and_no_texts() {
+    fn competition_hash_covers_rules_but_not_texts() {
         let hash = competition().hash();
         let changed = |change: fn(&mut Competition)| {
             let mut other = competition();
@@ -376,7 +376,7 @@ mod tests {
     }
 
     #[test]
-    fn competition_that_does_not_fit_together_is_refused() {
+    fn inconsistent_competition_is_refused() {
         assert_eq!(competition().check(), Ok(()));
         let refused = |change: fn(&mut Competition)| {
             let mut other = competition();

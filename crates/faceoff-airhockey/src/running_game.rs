@@ -9,7 +9,7 @@ use crate::{
     running_side::RunningSide,
     simulation_setup::SimulationSetup,
 };
-use faceoff_episode::{NonFiniteObservation, Question, RecordError};
+use faceoff_episode::{NonFiniteObservation, PendingStep, RecordError};
 use faceoff_sim::{Command, Divergence, Game, Interpolation};
 use faceoff_types::{
     AgentFault, AgentFaultKind, AgentTask, GameEnd, GameLimits, GameOutcome, Phase, Side,
@@ -36,8 +36,8 @@ use faceoff_types::{
 ///         reset_s: 0.001,
 ///     }))?;
 ///     while game.is_in_rally() {
-///         let actions = Side::BOTH.map(|side| match game.question(side) {
-///             Ok(Some(question)) => question.observation[6..13].to_vec(),
+///         let actions = Side::BOTH.map(|side| match game.pending_step(side) {
+///             Ok(Some(pending)) => pending.observation[6..13].to_vec(),
 ///             other => panic!("{other:?}"),
 ///         });
 ///         let [a, b] = &actions;
@@ -163,7 +163,10 @@ impl<S: GameSink> RunningGame<S> {
     ///
     /// # Errors
     /// If the simulator failed, which is not an agent fault.
-    pub fn question(&self, side: Side) -> Result<Option<Question<'_>>, NonFiniteObservation> {
+    pub fn pending_step(
+        &self,
+        side: Side,
+    ) -> Result<Option<PendingStep<'_>>, NonFiniteObservation> {
         if self.fault(side).is_some() {
             return Ok(None);
         }
@@ -176,7 +179,7 @@ impl<S: GameSink> RunningGame<S> {
                 episode: self.rally(),
             });
         }
-        Ok(Some(Question { step, observation }))
+        Ok(Some(PendingStep { step, observation }))
     }
 
     /// Simulates one control step.

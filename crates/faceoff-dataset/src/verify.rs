@@ -49,7 +49,7 @@ pub struct VerifiedDataset {
     pub result: EvaluationResult,
 }
 
-/// Simulates a dataset again on `workers` threads; `progress` is called after each episode. The result does not depend
+/// Simulates a dataset again on `threads` threads; `progress` is called after each episode. The result does not depend
 /// on the number of threads. Memory grows with the episodes, not with their steps.
 ///
 /// # Errors
@@ -58,7 +58,7 @@ pub struct VerifiedDataset {
 pub fn verify(
     dataset: &Dataset,
     simulator: &dyn Simulator,
-    workers: NonZero<usize>,
+    threads: NonZero<usize>,
     progress: &(dyn Fn() + Sync),
 ) -> Result<VerifiedDataset, VerifyError> {
     let ruleset = check_reproducible(dataset, simulator)?;
@@ -91,10 +91,10 @@ pub fn verify(
         .map_err(|invalid| DatasetError::Foreign(format!("{MANIFEST_FILE}: {invalid}")))?;
     let replayer = Replayer::new(ruleset, world_factory, competition);
     let pool = ThreadPoolBuilder::new()
-        .num_threads(workers.get())
+        .num_threads(threads.get())
         .thread_name(|index| format!("verify-{index}"))
         .build()?;
-    let batch_size = READ_AHEAD_PER_THREAD * workers.get();
+    let batch_size = READ_AHEAD_PER_THREAD * threads.get();
     pool.install(|| {
         let mut batch = reader.next_episodes(batch_size);
         while !batch.episodes.is_empty() {

@@ -126,13 +126,13 @@ fn play_in(
             let mut actions = [const { Vec::new() }; 2];
             let mut times = [Some(0.0); 2];
             for side in Side::BOTH {
-                let Some(question) = running.question(side).unwrap() else {
+                let Some(pending) = running.pending_step(side).unwrap() else {
                     continue;
                 };
                 let index = side.index();
-                assert_eq!(question.step, step);
-                let held: [f64; 7] = question.observation[JOINT_POSITIONS].try_into().unwrap();
-                speeds[index] = question.observation[JOINT_VELOCITIES].try_into().unwrap();
+                assert_eq!(pending.step, step);
+                let held: [f64; 7] = pending.observation[JOINT_POSITIONS].try_into().unwrap();
+                speeds[index] = pending.observation[JOINT_VELOCITIES].try_into().unwrap();
                 let (target, time) = match scripts[index](rally, step) {
                     ScriptedStep::Hold(time) => (held, Some(time)),
                     ScriptedStep::Swing(time) => (held.map(|q| q + 0.05), Some(time)),
@@ -254,7 +254,7 @@ fn fault_holds_the_arm_and_restarts_the_agent() {
 }
 
 #[test]
-fn too_many_faults_forfeit_and_both_sides_draw() {
+fn too_many_faults_forfeit_for_one_or_both_sides() {
     fn always_fault(_: u32, _: u32) -> ScriptedStep {
         ScriptedStep::Fault
     }

@@ -147,10 +147,10 @@ impl EpisodeReplay<'_> {
             Err(difference) => Some(difference),
         });
         let steps = &mut self.running.sink().steps;
-        let played = RecordBatch::try_new(steps.schema().clone(), steps.take())
+        let simulated = RecordBatch::try_new(steps.schema().clone(), steps.take())
             .expect("the rows are built by their own schema");
         // A difference before the error is reported first.
-        if let Some(cell) = compare::first_row_difference(batch, &played) {
+        if let Some(cell) = compare::first_row_difference(batch, &simulated) {
             let step = first.saturating_add(u32::try_from(cell.row).unwrap_or(u32::MAX));
             return Err(self.step_difference(step, &cell.field, cell.recorded, cell.expected));
         }
@@ -311,9 +311,9 @@ impl EpisodeReplay<'_> {
                 "a fault",
             ));
         }
-        let played = RecordBatch::try_new(rows.episodes.schema().clone(), rows.episodes.take())
+        let simulated = RecordBatch::try_new(rows.episodes.schema().clone(), rows.episodes.take())
             .expect("the row is built by its own schema");
-        match compare::first_row_difference(&recorded.row, &played) {
+        match compare::first_row_difference(&recorded.row, &simulated) {
             None => Ok(ReplayedEpisode {
                 outcome,
                 steps: std::mem::take(&mut rows.measured),

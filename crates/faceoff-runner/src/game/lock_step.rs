@@ -5,7 +5,7 @@
 use super::side_player::{SidePlayer, StartResult};
 use crate::{calibration::Calibration, fault::PlatformFault, session::Session};
 use faceoff_airhockey::{GameSink, RunningGame};
-use faceoff_episode::Question;
+use faceoff_episode::PendingStep;
 use faceoff_sandbox::{Layer, SandboxError};
 use faceoff_types::{AgentFault, AgentTask, Side, TimeLimits};
 use std::time::{Duration, Instant};
@@ -135,9 +135,12 @@ fn step<S: GameSink>(
     sides: &mut [SidePlayer<'_>; 2],
     after_answer: AfterAnswer,
 ) -> Result<(), PlatformFault> {
-    let questions = [game.question(Side::First)?, game.question(Side::Second)?];
-    ask_both(sides, |side, player| match questions[side.index()] {
-        Some(Question { step, observation }) => {
+    let pending_steps = [
+        game.pending_step(Side::First)?,
+        game.pending_step(Side::Second)?,
+    ];
+    ask_both(sides, |side, player| match pending_steps[side.index()] {
+        Some(PendingStep { step, observation }) => {
             player.ask(|session| session.send_step(step, observation))
         }
         None => Ok(()),

@@ -66,13 +66,13 @@ fn record_dataset(dir: &Path) {
             RunningEpisode::begin(world_factory, spec.task, episode, layout, &mut recorder)
                 .unwrap();
         let outcome = loop {
-            let question = running.question().unwrap();
-            if question.step == 30 {
+            let pending = running.pending_step().unwrap();
+            if pending.step == 30 {
                 let line = Some("oops".to_owned());
                 let fault = faceoff_types::AgentFaultKind::NonFinite;
                 break running.outcome_after_fault(Phase::Step, fault, line);
             }
-            let action = question.observation[6..13].to_vec();
+            let action = pending.observation[6..13].to_vec();
             let timing = AnswerTiming {
                 computation_time_s: 0.001,
                 host_time_s: 0.0,
@@ -193,7 +193,7 @@ pub(super) fn label(outcome: &Result<(), VerifyError>) -> &'static str {
         Err(VerifyError::Dataset(DatasetError::Foreign(_))) => "foreign",
         Err(VerifyError::Dataset(DatasetError::Altered(_))) => "altered",
         Err(VerifyError::Dataset(DatasetError::Absent(_))) => "absent",
-        Err(VerifyError::Workers(error)) => panic!("{error}"),
+        Err(VerifyError::Threads(error)) => panic!("{error}"),
         Err(VerifyError::Recording(error)) => panic!("{error}"),
         Err(VerifyError::Job(error)) => panic!("{error}"),
     }

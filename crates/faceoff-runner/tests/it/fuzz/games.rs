@@ -49,8 +49,8 @@ fn record_game(out: &Path) {
         while game.is_in_rally() {
             let step = game.rally_steps();
             let actions = Side::BOTH.map(|side| {
-                let question = game.question(side).unwrap()?;
-                Some(question.observation[6..13].to_vec())
+                let pending = game.pending_step(side).unwrap()?;
+                Some(pending.observation[6..13].to_vec())
             });
             let responses = Side::BOTH.map(|side| {
                 let timing = AnswerTiming {
