@@ -7,7 +7,7 @@ use parquet::{
     file::metadata::{ColumnChunkMetaData, ParquetMetaData},
 };
 
-/// Maximum number of rows of a row group; this program writes some ten thousand.
+/// Maximum number of rows of a row group; this program writes about 33,000.
 const MAX_GROUP_ROWS: i64 = 1 << 24;
 /// Maximum mean size of a column's values (numbers, short texts or lists of up to a few hundred numbers), in bytes before
 /// compression.

@@ -34,7 +34,7 @@ pub(super) struct ReplayedEpisode {
     /// Data of the episode's steps for scoring.
     pub steps: Measurements,
     /// How often the episode was played again because other programs disturbed the host.
-    pub host_noise_reruns: u32,
+    pub host_interference_reruns: u32,
 }
 
 /// Replay of one episode with its recorded answers.
@@ -72,9 +72,13 @@ impl StepSink for ReplayRows {
             .extend_from_slice(row.world.constraint_values());
     }
 
-    fn end(&mut self, outcome: &EpisodeOutcome, host_noise_reruns: u32) -> Result<(), RecordError> {
+    fn end(
+        &mut self,
+        outcome: &EpisodeOutcome,
+        host_interference_reruns: u32,
+    ) -> Result<(), RecordError> {
         self.episodes
-            .end(outcome, host_noise_reruns)
+            .end(outcome, host_interference_reruns)
             .map_err(|error| RecordError {
                 what: "the episode's row".to_owned(),
                 source: error.into(),
@@ -301,9 +305,9 @@ impl EpisodeReplay<'_> {
         };
         // The number of re-runs cannot be simulated.
         let reruns = Columns(&recorded.row).int("host_noise_reruns", 0);
-        let host_noise_reruns = reruns.unwrap_or_default();
+        let host_interference_reruns = reruns.unwrap_or_default();
         let rows = self.running.sink();
-        if let Err(error) = rows.end(&outcome, host_noise_reruns) {
+        if let Err(error) = rows.end(&outcome, host_interference_reruns) {
             return Err(row_difference(
                 recorded,
                 "fault",
@@ -317,7 +321,7 @@ impl EpisodeReplay<'_> {
             None => Ok(ReplayedEpisode {
                 outcome,
                 steps: std::mem::take(&mut rows.measured),
-                host_noise_reruns,
+                host_interference_reruns,
             }),
             Some(cell) => Err(row_difference(
                 recorded,
