@@ -171,7 +171,7 @@ pub fn competition() -> Competition {
                 JOINT_VEL_POINTS,
             ),
             ViolationInfo {
-                breach: "late answers".to_owned(),
+                description: "late answers".to_owned(),
                 points: [COMPUTATION_TIME_MIN_POINTS, COMPUTATION_TIME_MAX_POINTS],
                 ..violation(
                     ViolationName::COMPUTATION_TIME,
@@ -267,18 +267,18 @@ fn profile(profile: Profile, letter: char, title: &str, description: &str) -> Pr
     }
 }
 
-/// A violation of the rules. `breach` is the violation in words, and the heading of columns; `short` is a short heading, and `measure`
-/// the measured quantity with its unit.
+/// A kind of violation. `description` is also the heading of columns; `short` is a short heading, and `measure` the measured
+/// quantity with its unit.
 fn violation(
     name: ViolationName,
-    [title, breach, short, measure]: [&str; 4],
+    [title, description, short, measure]: [&str; 4],
     points: f64,
 ) -> ViolationInfo {
     ViolationInfo {
         name,
         title: title.to_owned(),
-        column: breach.to_owned(),
-        breach: breach.to_owned(),
+        column: description.to_owned(),
+        description: description.to_owned(),
         short: short.to_owned(),
         measure: measure.to_owned(),
         points: [points, points],
@@ -362,7 +362,10 @@ mod tests {
         };
         assert_eq!(changed(|other| other.title.clear()), hash);
         assert_eq!(changed(|other| other.tasks[0].aim.clear()), hash);
-        assert_eq!(changed(|other| other.violations[0].breach.clear()), hash);
+        assert_eq!(
+            changed(|other| other.violations[0].description.clear()),
+            hash
+        );
         for other in [
             changed(|other| other.id.push('x')),
             changed(|other| other.tasks[0].max_steps += 1),

@@ -10,7 +10,7 @@ use crate::{
     views::{credentials, token},
 };
 use faceoff_api::{
-    requests::{self, DependentCredentials},
+    requests::{self, Made},
     token::{Secret, SecretKind},
     views::{credentials::RevokedTokenView, token::NewTokenView},
 };
@@ -180,7 +180,7 @@ pub async fn revoke_token(
     app: &AppState,
     caller: &Caller,
     id: TokenId,
-    made: Option<DependentCredentials>,
+    made: Option<Made>,
 ) -> Result<RevokedTokenView, Problem> {
     let token = find(app, caller, id).await?;
     let is_own = match (&caller.principal, token.owner) {
@@ -191,14 +191,10 @@ pub async fn revoke_token(
         _ => false,
     };
     let now = app.config.clock.now();
-    let default = if is_own {
-        DependentCredentials::Keep
-    } else {
-        DependentCredentials::End
-    };
+    let default = if is_own { Made::Keep } else { Made::End };
     let made = match made.unwrap_or(default) {
-        DependentCredentials::Keep => EndMade::Keep,
-        DependentCredentials::End => EndMade::Except(Some(caller.token.id)),
+        Made::Keep => EndMade::Keep,
+        Made::End => EndMade::Except(Some(caller.token.id)),
     };
     let revoked = app
         .store
