@@ -9,7 +9,7 @@ use crate::{
     running_side::RunningSide,
     simulation_setup::SimulationSetup,
 };
-use faceoff_episode::{NonFiniteObservation, PendingStep, RecordError};
+use faceoff_episode::{ActionRequest, NonFiniteObservation, RecordError};
 use faceoff_sim::{Command, Divergence, Game, Interpolation};
 use faceoff_types::{
     AgentFault, AgentFaultKind, AgentTask, GameEnd, GameLimits, GameOutcome, Phase, Side,
@@ -36,8 +36,8 @@ use faceoff_types::{
 ///         reset_s: 0.001,
 ///     }))?;
 ///     while game.is_in_rally() {
-///         let actions = Side::BOTH.map(|side| match game.pending_step(side) {
-///             Ok(Some(pending)) => pending.observation[6..13].to_vec(),
+///         let actions = Side::BOTH.map(|side| match game.action_request(side) {
+///             Ok(Some(request)) => request.observation[6..13].to_vec(),
 ///             other => panic!("{other:?}"),
 ///         });
 ///         let [a, b] = &actions;
@@ -163,10 +163,10 @@ impl<S: GameSink> RunningGame<S> {
     ///
     /// # Errors
     /// If the simulator failed, which is not an agent fault.
-    pub fn pending_step(
+    pub fn action_request(
         &self,
         side: Side,
-    ) -> Result<Option<PendingStep<'_>>, NonFiniteObservation> {
+    ) -> Result<Option<ActionRequest<'_>>, NonFiniteObservation> {
         if self.fault(side).is_some() {
             return Ok(None);
         }
@@ -179,7 +179,7 @@ impl<S: GameSink> RunningGame<S> {
                 episode: self.rally(),
             });
         }
-        Ok(Some(PendingStep { step, observation }))
+        Ok(Some(ActionRequest { step, observation }))
     }
 
     /// Simulates one control step.

@@ -9,6 +9,6 @@ mod time_sum;
 mod world;
 
 pub use record::{AnswerTiming, EpisodeStart, NullSink, RecordError, StepRow, StepSink};
-pub use running_episode::{NonFiniteObservation, PendingStep, RunningEpisode};
+pub use running_episode::{ActionRequest, NonFiniteObservation, RunningEpisode};
 pub use time_sum::TimeSum;
 pub use world::{Conditions, InvalidConditions, Simulator, StateColumns, World, WorldFactory};

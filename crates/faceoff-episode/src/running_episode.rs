@@ -25,7 +25,7 @@ use std::fmt;
 /// let setup = SimulationSetup::new(AirHockeyProfile::Ideal, seed, seed.model_mismatch());
 /// let mut running = RunningEpisode::begin(&setup, hit, 0, Some(Interpolation::Linear.into()), NullSink)?;
 /// let outcome = loop {
-///     let joint_positions = running.pending_step()?.observation[6..13].to_vec();
+///     let joint_positions = running.action_request()?.observation[6..13].to_vec();
 ///     let timing = AnswerTiming {
 ///         computation_time_s: 0.001,
 ///         host_time_s: 0.0,
@@ -69,7 +69,7 @@ impl<S: fmt::Debug> fmt::Debug for RunningEpisode<S> {
 
 /// The next observation, which the agent has to answer with an action.
 #[derive(Debug, Clone, Copy)]
-pub struct PendingStep<'a> {
+pub struct ActionRequest<'a> {
     /// The control step, from 0.
     pub step: u32,
     /// Finite numbers; in air hockey 23 with an opponent on the table, 20 without.
@@ -129,7 +129,7 @@ impl<S: StepSink> RunningEpisode<S> {
     ///
     /// # Errors
     /// If the simulator failed, which is neither an end of the episode nor an agent fault.
-    pub fn pending_step(&self) -> Result<PendingStep<'_>, NonFiniteObservation> {
+    pub fn action_request(&self) -> Result<ActionRequest<'_>, NonFiniteObservation> {
         let (step, observation) = (self.world.steps(), self.world.observation());
         // Later observations are finite, since a diverging world ends the episode.
         if step == 0 && !are_finite(observation) {
@@ -138,7 +138,7 @@ impl<S: StepSink> RunningEpisode<S> {
                 episode: self.episode,
             });
         }
-        Ok(PendingStep { step, observation })
+        Ok(ActionRequest { step, observation })
     }
 
     /// Simulates one control step. `action` is row-major, finite, and has the length of the agent's layout. Returns the outcome

@@ -187,11 +187,11 @@ pub struct PolicyEpisode {
 impl PolicyEpisode {
     /// The observation of the protocol: 23 numbers with an opponent on the table, 20 without.
     fn observation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let pending = self
+        let request = self
             .running
-            .pending_step()
+            .action_request()
             .map_err(|error| simulator_error(&error.to_string()))?;
-        Ok(PyArray1::from_slice(py, pending.observation))
+        Ok(PyArray1::from_slice(py, request.observation))
     }
 
     /// Runs a control step. Returns the outcome as JSON at the episode's end.

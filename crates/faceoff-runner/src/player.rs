@@ -11,7 +11,7 @@ use crate::{
     session::Session,
     wait_breakdown::WaitBreakdown,
 };
-use faceoff_episode::{PendingStep, RunningEpisode, StepSink, WorldFactory};
+use faceoff_episode::{ActionRequest, RunningEpisode, StepSink, WorldFactory};
 use faceoff_types::{AgentFaultKind, EpisodeOutcome, Phase, Task};
 use std::time::Instant;
 
@@ -333,7 +333,7 @@ impl<'a> Player<'a> {
             if cancelled() {
                 return Err(PlatformFault::Cancelled.into());
             }
-            let PendingStep { step, observation } = running.pending_step()?;
+            let ActionRequest { step, observation } = running.action_request()?;
             let timing = session.step(step, observation)?;
             self.max_host_interference_s = self.max_host_interference_s.max(timing.host_time_s);
             if let Some(outcome) = running.answer(session.action(), timing)? {

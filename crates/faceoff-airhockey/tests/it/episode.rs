@@ -3,7 +3,7 @@
 use faceoff_airhockey::{DEFEND, HIT, PREPARE, TASKS};
 use faceoff_airhockey::{SimulationSetup, recording_columns};
 use faceoff_episode::{
-    AnswerTiming, EpisodeStart, NullSink, PendingStep, RecordError, RunningEpisode, StateColumns,
+    ActionRequest, AnswerTiming, EpisodeStart, NullSink, RecordError, RunningEpisode, StateColumns,
     StepRow, StepSink, World,
 };
 use faceoff_sim::{AirHockeyProfile, Bounds, Interpolation};
@@ -92,12 +92,12 @@ fn begin<S: StepSink>(task: Task, sink: S) -> RunningEpisode<S> {
 
 /// Answers with slightly moved joint positions, and a computation time that depends on the step.
 fn answer<S: StepSink>(running: &mut RunningEpisode<S>) -> Option<EpisodeOutcome> {
-    let pending = running.pending_step().unwrap();
-    let mut action = pending.observation[JOINT_POSITIONS].to_vec();
+    let request = running.action_request().unwrap();
+    let mut action = request.observation[JOINT_POSITIONS].to_vec();
     action[0] += 0.01;
     action.extend([0.0; 7]);
     let timing = AnswerTiming {
-        computation_time_s: 0.001 * f64::from(pending.step),
+        computation_time_s: 0.001 * f64::from(request.step),
         host_time_s: 0.0,
         cpu_time_s: None,
     };
@@ -223,7 +223,7 @@ fn divergence_is_an_agent_fault() {
     let mut played = SinkLog::default();
     let mut running = begin_within(narrow_bounds, &mut played);
     let kind = loop {
-        let PendingStep { observation, .. } = running.pending_step().unwrap();
+        let ActionRequest { observation, .. } = running.action_request().unwrap();
         assert!(observation.iter().all(|number| number.is_finite()));
         let action = extreme_action(observation);
         match running.answer(&action, timing) {

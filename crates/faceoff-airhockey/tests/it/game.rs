@@ -126,13 +126,13 @@ fn play_in(
             let mut actions = [const { Vec::new() }; 2];
             let mut times = [Some(0.0); 2];
             for side in Side::BOTH {
-                let Some(pending) = running.pending_step(side).unwrap() else {
+                let Some(request) = running.action_request(side).unwrap() else {
                     continue;
                 };
                 let index = side.index();
-                assert_eq!(pending.step, step);
-                let held: [f64; 7] = pending.observation[JOINT_POSITIONS].try_into().unwrap();
-                speeds[index] = pending.observation[JOINT_VELOCITIES].try_into().unwrap();
+                assert_eq!(request.step, step);
+                let held: [f64; 7] = request.observation[JOINT_POSITIONS].try_into().unwrap();
+                speeds[index] = request.observation[JOINT_VELOCITIES].try_into().unwrap();
                 let (target, time) = match scripts[index](rally, step) {
                     ScriptedStep::Hold(time) => (held, Some(time)),
                     ScriptedStep::Swing(time) => (held.map(|q| q + 0.05), Some(time)),

@@ -89,8 +89,8 @@ fn record(out: &Path) {
         while game.is_in_rally() {
             let step = game.rally_steps();
             let actions = Side::BOTH.map(|side| {
-                let pending = game.pending_step(side).unwrap()?;
-                let mut joints: [f64; 7] = pending.observation[6..13].try_into().unwrap();
+                let request = game.action_request(side).unwrap()?;
+                let mut joints: [f64; 7] = request.observation[6..13].try_into().unwrap();
                 joints[0] += 0.001 * f64::from(step % 30);
                 let interpolation = interpolations[side.index()].unwrap();
                 Some(interpolation.hold_position(&joints)[..interpolation.len()].to_vec())

@@ -156,7 +156,7 @@ fn play<S: StepSink>(
 ) -> Result<EpisodeOutcome, AgentFaultKind> {
     let mut running = RunningEpisode::begin(line, REACH, 3, Some(layout), sink).unwrap();
     loop {
-        let action = [factor * running.pending_step().unwrap().observation[0]];
+        let action = [factor * running.action_request().unwrap().observation[0]];
         if let Some(outcome) = running.answer(&action, TIMING)? {
             return Ok(outcome);
         }
@@ -203,7 +203,7 @@ fn first_observation_that_is_not_finite_is_no_agent_fault() {
         start_m: Some(f64::NAN),
     };
     let running = RunningEpisode::begin(&line, REACH, 3, None, NullSink).unwrap();
-    let error = running.pending_step().unwrap_err();
+    let error = running.action_request().unwrap_err();
     assert_eq!(error.episode, 3);
 }
 

@@ -5,7 +5,7 @@
 use super::side_player::{SidePlayer, StartResult};
 use crate::{calibration::Calibration, fault::PlatformFault, session::Session};
 use faceoff_airhockey::{GameSink, RunningGame};
-use faceoff_episode::PendingStep;
+use faceoff_episode::ActionRequest;
 use faceoff_sandbox::{Layer, SandboxError};
 use faceoff_types::{AgentFault, AgentTask, Side, TimeLimits};
 use std::time::{Duration, Instant};
@@ -135,12 +135,12 @@ fn step<S: GameSink>(
     sides: &mut [SidePlayer<'_>; 2],
     after_answer: AfterAnswer,
 ) -> Result<(), PlatformFault> {
-    let pending_steps = [
-        game.pending_step(Side::First)?,
-        game.pending_step(Side::Second)?,
+    let requests = [
+        game.action_request(Side::First)?,
+        game.action_request(Side::Second)?,
     ];
-    ask_both(sides, |side, player| match pending_steps[side.index()] {
-        Some(PendingStep { step, observation }) => {
+    ask_both(sides, |side, player| match requests[side.index()] {
+        Some(ActionRequest { step, observation }) => {
             player.ask(|session| session.send_step(step, observation))
         }
         None => Ok(()),

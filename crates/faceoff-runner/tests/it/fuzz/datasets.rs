@@ -66,13 +66,13 @@ fn record_dataset(dir: &Path) {
             RunningEpisode::begin(world_factory, spec.task, episode, layout, &mut recorder)
                 .unwrap();
         let outcome = loop {
-            let pending = running.pending_step().unwrap();
-            if pending.step == 30 {
+            let request = running.action_request().unwrap();
+            if request.step == 30 {
                 let line = Some("oops".to_owned());
                 let fault = faceoff_types::AgentFaultKind::NonFinite;
                 break running.outcome_after_fault(Phase::Step, fault, line);
             }
-            let action = pending.observation[6..13].to_vec();
+            let action = request.observation[6..13].to_vec();
             let timing = AnswerTiming {
                 computation_time_s: 0.001,
                 host_time_s: 0.0,

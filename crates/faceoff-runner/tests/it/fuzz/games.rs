@@ -49,8 +49,8 @@ fn record_game(out: &Path) {
         while game.is_in_rally() {
             let step = game.rally_steps();
             let actions = Side::BOTH.map(|side| {
-                let pending = game.pending_step(side).unwrap()?;
-                Some(pending.observation[6..13].to_vec())
+                let request = game.action_request(side).unwrap()?;
+                Some(request.observation[6..13].to_vec())
             });
             let responses = Side::BOTH.map(|side| {
                 let timing = AnswerTiming {
