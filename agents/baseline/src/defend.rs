@@ -12,7 +12,7 @@ const INTERCEPTION_X: f64 = -0.56;
 /// Prediction horizon for the crossing, seconds.
 const HORIZON: f64 = 2.0;
 /// A plan whose contact is nearer than this is not changed any more, seconds.
-const PLAN_TIME: f64 = 0.6;
+const LAST_CORRECTION: f64 = 0.6;
 /// Speed of the mallet's retreat as a share of the puck's speed. 0: this agent does not cushion the contact, unlike `striker`.
 const RETREAT_SHARE: f64 = 0.0;
 
@@ -38,9 +38,9 @@ impl Defend {
 
     /// The command for this control step.
     pub fn decide(&mut self, scene: &Scene<'_>) -> MalletCommand {
-        let valid_plan = self
-            .interception
-            .filter(|plan| plan.time - scene.time < PLAN_TIME && plan.time - scene.time > -0.06);
+        let valid_plan = self.interception.filter(|plan| {
+            plan.time - scene.time < LAST_CORRECTION && plan.time - scene.time > -0.06
+        });
         self.interception = valid_plan.or_else(|| find_crossing(scene));
         let Some(plan) = self.interception else {
             return guard(scene);

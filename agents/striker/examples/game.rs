@@ -22,7 +22,7 @@ mod support;
 mod program;
 
 use program::Program;
-use support::game::{Player, new_game, play};
+use support::game::{Player, ROBOT_1, ROBOT_2, new_game, play};
 
 /// Distance of a robot's base from the table's centre, metres.
 const BASE_DISTANCE_M: f64 = 1.51;
@@ -50,7 +50,7 @@ fn main() -> anyhow::Result<()> {
     });
     let lists_events = std::env::var("LIST").is_ok();
     for seed in first_seed..first_seed + games {
-        let mut players = [player(&names[0], 0)?, player(&names[1], 1)?];
+        let mut players = [player(&names[0], ROBOT_1)?, player(&names[1], ROBOT_2)?];
         let mut violated = [[false; 4]; 2];
         let tally = play(
             &mut new_game(profile, seed),

@@ -8,8 +8,8 @@ use crate::field::{Field, Vec2};
 use crate::keeper::Keeper;
 use crate::kinematics::forward;
 use crate::motion::Motion;
+use crate::policy::{Action, Task, WrongLength};
 use crate::scene::{MalletCommand, Scene};
-use crate::task::{Action, Task, WrongLength};
 
 /// Estimates of puck and opponent, and the references (commanded motions) of arm and mallet.
 #[derive(Debug, Clone)]
@@ -93,7 +93,7 @@ impl Body {
             dt: self.dt,
             time,
             puck,
-            puck_speed_deviation: self.estimator.speed_deviation(),
+            puck_velocity_deviation: self.estimator.velocity_deviation(),
             mallet: self.mallet,
             arm: &self.arm,
             keeper: &self.keeper,

@@ -90,7 +90,7 @@ pub fn substep(puck: &mut Puck, field: &Field, mallet: Vec2, velocity: Vec2) {
             &mut sum,
         );
     }
-    let long_rim_depth = puck.pos.y.abs() - field.puck_y();
+    let long_rim_depth = puck.pos.y.abs() - field.puck_y_max();
     if long_rim_depth > 0.0 {
         add_contact(
             puck,
@@ -103,7 +103,7 @@ pub fn substep(puck: &mut Puck, field: &Field, mallet: Vec2, velocity: Vec2) {
             &mut sum,
         );
     }
-    let short_rim_depth = puck.pos.x.abs() - field.puck_x();
+    let short_rim_depth = puck.pos.x.abs() - field.puck_x_max();
     if short_rim_depth > 0.0 {
         if puck.pos.y.abs() > field.half_goal + POST_RADIUS {
             add_contact(
@@ -177,13 +177,14 @@ fn add_contact(
     let slip = relative.dot(&tangent) - puck.spin * radius;
     let free_normal = free.force.dot(&normal) / PUCK_MASS;
     let free_tangent = free.force.dot(&tangent) / PUCK_MASS - free.torque / PUCK_INERTIA * radius;
-    let push = (-law.damping * relative.dot(&normal) + law.stiffness * impedance * depth
+    let normal_force = (-law.damping * relative.dot(&normal) + law.stiffness * impedance * depth
         - free_normal)
         / (1.0 / PUCK_MASS + law.inverse_mass + regularisation);
-    let push = push.max(0.0);
-    let grip = (-law.damping * slip - free_tangent)
+    let normal_force = normal_force.max(0.0);
+    let friction_force = (-law.damping * slip - free_tangent)
         / (1.0 / PUCK_MASS + radius * radius / PUCK_INERTIA + law.inverse_mass + regularisation);
-    let grip = grip.clamp(-law.friction * push, law.friction * push);
-    sum.force += push * normal + grip * tangent;
-    sum.torque -= grip * radius;
+    let friction_force =
+        friction_force.clamp(-law.friction * normal_force, law.friction * normal_force);
+    sum.force += normal_force * normal + friction_force * tangent;
+    sum.torque -= friction_force * radius;
 }

@@ -128,7 +128,7 @@ impl Estimator {
     }
 
     /// Standard deviations of the estimated velocity's components, m/s.
-    pub fn speed_deviation(&self) -> Vec2 {
+    pub fn velocity_deviation(&self) -> Vec2 {
         self.axes.map_or(Vec2::zeros(), |[x, y]| {
             Vec2::new(x.cov[(1, 1)].max(0.0).sqrt(), y.cov[(1, 1)].max(0.0).sqrt())
         })

@@ -60,12 +60,12 @@ impl Field {
     }
 
     /// Largest |x| of the puck's centre in front of the short rims.
-    pub fn puck_x(&self) -> f64 {
+    pub fn puck_x_max(&self) -> f64 {
         self.half_length - self.puck_radius
     }
 
     /// Largest |y| of the puck's centre.
-    pub fn puck_y(&self) -> f64 {
+    pub fn puck_y_max(&self) -> f64 {
         self.half_width - self.puck_radius
     }
 

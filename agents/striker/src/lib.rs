@@ -15,12 +15,12 @@ mod keeper;
 mod kinematics;
 pub mod motion;
 mod pendulum;
+mod policy;
 pub mod protocol;
 pub mod puck;
 mod redundancy;
 pub mod scene;
 mod skills;
-mod task;
 #[cfg(test)]
 mod testing;
 
@@ -30,7 +30,7 @@ use skills::{Defend, Hit, Prepare, Tournament};
 pub use body::Body;
 pub use env::{BaseFrame, Env, JOINTS, Joints, RadiusInfo, RobotInfo, TableInfo};
 pub use kinematics::{Pose, forward};
-pub use task::{Action, Policy, Task, WrongLength};
+pub use policy::{Action, Policy, Task, WrongLength};
 
 /// The kind of play for the task: each skill decides where the mallet moves.
 #[derive(Debug, Clone)]

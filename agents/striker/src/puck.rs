@@ -62,8 +62,8 @@ impl Puck {
             let speed_loss = DRAG * distance.max(0.0) / vel.abs();
             (vel.abs() > 1e-6 && speed_loss < 1.0).then(|| -(1.0 - speed_loss).ln() / DRAG)
         };
-        let short = arrival_time(self.pos.x, self.vel.x, field.puck_x());
-        let long = arrival_time(self.pos.y, self.vel.y, field.puck_y());
+        let short = arrival_time(self.pos.x, self.vel.x, field.puck_x_max());
+        let long = arrival_time(self.pos.y, self.vel.y, field.puck_y_max());
         match (short, long) {
             (Some(short), Some(long)) if long < short => Some((long, Rim::Long)),
             (Some(short), _) => {

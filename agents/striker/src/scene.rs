@@ -16,7 +16,7 @@ pub struct Scene<'a> {
     pub time: f64,
     pub puck: Puck,
     /// Standard deviations of the puck's velocity components, m/s.
-    pub puck_speed_deviation: Vec2,
+    pub puck_velocity_deviation: Vec2,
     /// Reference of the own mallet: its commanded motion.
     pub mallet: Motion,
     /// The arm, for its possible speeds.

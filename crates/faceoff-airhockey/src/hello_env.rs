@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn game_hello_has_the_side_and_its_own_frame_first() {
+    fn game_hello_has_agent_id_and_own_base_frame_first() {
         for (side, agent_id, own_x) in [(Side::First, 1, -1.51), (Side::Second, 2, 1.51)] {
             let agent_task = AgentTask::Game { side };
             let hello = hello(agent_task);

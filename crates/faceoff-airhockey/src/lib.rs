@@ -171,7 +171,7 @@ pub fn competition() -> Competition {
                 JOINT_VEL_POINTS,
             ),
             ViolationInfo {
-                breach: "late answers".to_owned(),
+                description: "late answers".to_owned(),
                 points: [COMPUTATION_TIME_MIN_POINTS, COMPUTATION_TIME_MAX_POINTS],
                 ..violation(
                     ViolationName::COMPUTATION_TIME,
@@ -243,8 +243,7 @@ const fn ruleset(ruleset: AirHockeyRuleset) -> RulesetInfo {
     }
 }
 
-/// `weight` in millionths.
-/// A task, without the texts that describe it.
+/// A task without its descriptive texts. `weight` is in millionths.
 fn task(task: Task, title: &str, weight: u32) -> TaskInfo {
     TaskInfo {
         task,
@@ -268,17 +267,18 @@ fn profile(profile: Profile, letter: char, title: &str, description: &str) -> Pr
     }
 }
 
-/// The texts are title, breach, short heading and measure; the heading of columns is the breach.
+/// A kind of violation. `description` is also the heading of columns; `short` is a short heading, and `measure` the measured
+/// quantity with its unit.
 fn violation(
     name: ViolationName,
-    [title, breach, short, measure]: [&str; 4],
+    [title, description, short, measure]: [&str; 4],
     points: f64,
 ) -> ViolationInfo {
     ViolationInfo {
         name,
         title: title.to_owned(),
-        column: breach.to_owned(),
-        breach: breach.to_owned(),
+        column: description.to_owned(),
+        description: description.to_owned(),
         short: short.to_owned(),
         measure: measure.to_owned(),
         points: [points, points],
@@ -330,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn rules_and_maps_follow_the_profiles() {
+    fn rules_are_checked_and_map_is_sorted_by_profile() {
         let competition = competition();
         let mut rules = StageRules {
             ruleset: RULESET,
@@ -353,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn hash_covers_rules_and_no_texts() {
+    fn competition_hash_covers_rules_but_not_texts() {
         let hash = competition().hash();
         let changed = |change: fn(&mut Competition)| {
             let mut other = competition();
@@ -362,7 +362,10 @@ mod tests {
         };
         assert_eq!(changed(|other| other.title.clear()), hash);
         assert_eq!(changed(|other| other.tasks[0].aim.clear()), hash);
-        assert_eq!(changed(|other| other.violations[0].breach.clear()), hash);
+        assert_eq!(
+            changed(|other| other.violations[0].description.clear()),
+            hash
+        );
         for other in [
             changed(|other| other.id.push('x')),
             changed(|other| other.tasks[0].max_steps += 1),
@@ -376,7 +379,7 @@ mod tests {
     }
 
     #[test]
-    fn competition_that_does_not_fit_together_is_refused() {
+    fn inconsistent_competition_is_refused() {
         assert_eq!(competition().check(), Ok(()));
         let refused = |change: fn(&mut Competition)| {
             let mut other = competition();

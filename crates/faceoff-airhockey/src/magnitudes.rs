@@ -138,10 +138,10 @@ fn describe(group: &'static str) -> impl Fn(&str, &str, Magnitude, [f64; 2]) -> 
     }
 }
 
-/// The simulator's settings; those of the ruleset where magnitudes are left out.
+/// Converts magnitudes to settings of the simulator. Magnitudes that are left out have the ruleset's values.
 ///
 /// # Errors
-/// Which magnitude the simulator does not have, as text.
+/// If the simulator does not have one of the magnitudes; the text names it.
 pub(crate) fn perturbation_settings(
     magnitudes: &Magnitudes,
 ) -> Result<PerturbationSettings, String> {
@@ -172,7 +172,7 @@ mod tests {
     use crate::{checked_magnitudes, competition};
 
     #[test]
-    fn magnitudes_are_all_of_the_simulator() {
+    fn magnitudes_cover_all_simulator_settings_and_defaults() {
         let mut all = Magnitudes::default();
         for info in magnitudes() {
             all.set(&info.group, &info.name, info.default);
@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn changed_settings_have_the_bits_of_the_magnitudes() {
+    fn settings_round_trip_through_magnitudes_bit_for_bit() {
         let mut changed = PerturbationSettings::default();
         changed.disturbance.sigma_n_per_m_s = 1.0 / 3.0;
         changed.tracking_loss.steps = [1, 2];

@@ -1,4 +1,4 @@
-//! The simulator of air hockey, as slots and verification use it.
+//! The simulator of air hockey, for workers and for verification.
 
 use crate::SimulationSetup;
 use crate::{
@@ -96,7 +96,7 @@ pub fn simulation_setup(conditions: &Conditions<'_>) -> Result<SimulationSetup, 
     ))
 }
 
-/// Checks settings of the simulator, and returns them as the platform has them.
+/// Checks settings of the simulator and converts them to [`Magnitudes`].
 ///
 /// # Errors
 /// The first magnitude that is out of range, or not a number.

@@ -7,9 +7,9 @@
 #![warn(missing_docs)]
 
 pub mod objects_only;
-pub mod pasted;
 pub mod paths;
 pub mod requests;
+pub mod secret_extraction;
 pub mod token;
 pub mod views;
 

@@ -55,7 +55,7 @@ impl ArchiveWriter {
         self.zip
             .start_file(name, options)
             .map_err(RecordingError::unusable(format!(
-                "adding {name} to the dataset"
+                "adding {name} to the archive"
             )))?;
         let mut out = HashingWriter::new(&mut self.zip);
         write(&mut out)?;
@@ -73,7 +73,7 @@ impl ArchiveWriter {
         let mut buffered = self
             .zip
             .finish()
-            .map_err(RecordingError::unusable("closing the dataset"))?;
+            .map_err(RecordingError::unusable("closing the archive"))?;
         buffered.flush()?;
         Ok(buffered.get_ref().sync_all()?)
     }

@@ -1,4 +1,4 @@
-//! The conditions of a shard: the same to play under, and to verify the recording with.
+//! The conditions of a shard's episodes, for running them and for verifying their recording.
 
 use faceoff_episode::Conditions;
 use faceoff_wire::job::ShardSpec;

@@ -51,10 +51,10 @@ impl Recorder {
     fn end_episode(
         &mut self,
         outcome: &EpisodeOutcome,
-        host_noise_reruns: u32,
+        host_interference_reruns: u32,
     ) -> Result<(), RecordingError> {
         self.steps_file.write(self.steps.take())?;
-        self.episodes.end(outcome, host_noise_reruns)?;
+        self.episodes.end(outcome, host_interference_reruns)?;
         if self.episodes.len() >= BUFFERED_EPISODES {
             self.episodes_file.write(self.episodes.take())?;
         }
@@ -103,9 +103,13 @@ impl StepSink for Recorder {
         self.clips.step(row);
     }
 
-    fn end(&mut self, outcome: &EpisodeOutcome, host_noise_reruns: u32) -> Result<(), RecordError> {
-        self.clips.end(outcome, host_noise_reruns)?;
-        self.end_episode(outcome, host_noise_reruns)
+    fn end(
+        &mut self,
+        outcome: &EpisodeOutcome,
+        host_interference_reruns: u32,
+    ) -> Result<(), RecordError> {
+        self.clips.end(outcome, host_interference_reruns)?;
+        self.end_episode(outcome, host_interference_reruns)
             .map_err(|error| RecordError {
                 what: "recording an episode".to_owned(),
                 source: error.into(),

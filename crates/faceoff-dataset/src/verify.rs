@@ -49,7 +49,7 @@ pub struct VerifiedDataset {
     pub result: EvaluationResult,
 }
 
-/// Simulates a dataset again on `workers` threads; `progress` is called after each episode. The result does not depend
+/// Simulates a dataset again on `threads` threads; `progress` is called after each episode. The result does not depend
 /// on the number of threads. Memory grows with the episodes, not with their steps.
 ///
 /// # Errors
@@ -58,7 +58,7 @@ pub struct VerifiedDataset {
 pub fn verify(
     dataset: &Dataset,
     simulator: &dyn Simulator,
-    workers: NonZero<usize>,
+    threads: NonZero<usize>,
     progress: &(dyn Fn() + Sync),
 ) -> Result<VerifiedDataset, VerifyError> {
     let ruleset = check_reproducible(dataset, simulator)?;
@@ -91,10 +91,10 @@ pub fn verify(
         .map_err(|invalid| DatasetError::Foreign(format!("{MANIFEST_FILE}: {invalid}")))?;
     let replayer = Replayer::new(ruleset, world_factory, competition);
     let pool = ThreadPoolBuilder::new()
-        .num_threads(workers.get())
+        .num_threads(threads.get())
         .thread_name(|index| format!("verify-{index}"))
         .build()?;
-    let batch_size = READ_AHEAD_PER_THREAD * workers.get();
+    let batch_size = READ_AHEAD_PER_THREAD * threads.get();
     pool.install(|| {
         let mut batch = reader.next_episodes(batch_size);
         while !batch.episodes.is_empty() {
@@ -152,7 +152,7 @@ fn check_reproducible(
 struct Totals {
     episodes: u32,
     steps: u64,
-    host_noise_reruns: u32,
+    host_interference_reruns: u32,
     tallies: TaskMap<Tally>,
 }
 
@@ -170,7 +170,7 @@ impl Totals {
         Self {
             episodes: 0,
             steps: 0,
-            host_noise_reruns: 0,
+            host_interference_reruns: 0,
             tallies: tasks.iter().map(tally).collect(),
         }
     }
@@ -178,7 +178,7 @@ impl Totals {
     fn add(&mut self, recorded: &RecordedEpisode, replayed: ReplayedEpisode) {
         self.episodes += 1;
         self.steps += u64::from(replayed.outcome.steps);
-        self.host_noise_reruns += replayed.host_noise_reruns;
+        self.host_interference_reruns += replayed.host_interference_reruns;
         if let Some(tally) = self.tallies.get_mut(&recorded.task) {
             tally.add_steps(recorded.episode, &replayed.steps);
             tally.add_episode(replayed.outcome);
@@ -193,8 +193,8 @@ impl Totals {
     ) -> Result<VerifiedDataset, VerifyError> {
         let manifest = dataset.manifest();
         let timing = dataset.calibration()?.worst();
-        let recorded_reruns = timing.map_or(0, |timing| timing.host_noise_reruns);
-        if recorded_reruns != self.host_noise_reruns {
+        let recorded_reruns = timing.map_or(0, |timing| timing.host_interference_reruns);
+        if recorded_reruns != self.host_interference_reruns {
             return Err(Difference {
                 file: CALIBRATION_FILE,
                 task: None,
@@ -203,7 +203,10 @@ impl Totals {
                 step: None,
                 field: "host_noise_reruns".to_owned(),
                 recorded: format!("{recorded_reruns} in total"),
-                expected: format!("{}, the sum over the episodes", self.host_noise_reruns),
+                expected: format!(
+                    "{}, the sum over the episodes",
+                    self.host_interference_reruns
+                ),
             }
             .into());
         }

@@ -61,11 +61,15 @@ pub trait StepSink {
     fn observe(&mut self, observation: &[f64]);
     /// The step after the observation.
     fn step(&mut self, row: &StepRow<'_>);
-    /// Ends the episode. `host_noise_reruns` is the number of earlier tries that were discarded because of host interference.
+    /// Ends the episode. `host_interference_reruns` is the number of earlier tries that were discarded because of host interference.
     ///
     /// # Errors
     /// If the recording could not be written.
-    fn end(&mut self, outcome: &EpisodeOutcome, host_noise_reruns: u32) -> Result<(), RecordError>;
+    fn end(
+        &mut self,
+        outcome: &EpisodeOutcome,
+        host_interference_reruns: u32,
+    ) -> Result<(), RecordError>;
 }
 
 impl<S: StepSink + ?Sized> StepSink for &mut S {
@@ -78,8 +82,12 @@ impl<S: StepSink + ?Sized> StepSink for &mut S {
     fn step(&mut self, row: &StepRow<'_>) {
         (**self).step(row);
     }
-    fn end(&mut self, outcome: &EpisodeOutcome, host_noise_reruns: u32) -> Result<(), RecordError> {
-        (**self).end(outcome, host_noise_reruns)
+    fn end(
+        &mut self,
+        outcome: &EpisodeOutcome,
+        host_interference_reruns: u32,
+    ) -> Result<(), RecordError> {
+        (**self).end(outcome, host_interference_reruns)
     }
 }
 

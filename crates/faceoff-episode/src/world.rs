@@ -83,7 +83,7 @@ pub enum InvalidConditions {
     Magnitudes(String),
 }
 
-/// A competition with its simulator: slots play episodes in it, and verification plays recorded ones again.
+/// A competition with its simulator. Workers run episodes with it, and verification replays recorded ones.
 pub trait Simulator: fmt::Debug + Send + Sync {
     fn competition(&self) -> &Arc<Competition>;
     /// A hash of what the simulator computes, as 64 hexadecimal digits: recordings of a simulator with another one cannot be verified.
@@ -101,11 +101,11 @@ pub trait Simulator: fmt::Debug + Send + Sync {
         &self,
         conditions: &Conditions<'_>,
     ) -> Result<Box<dyn WorldFactory>, InvalidConditions>;
-    /// Checks that a season with this seed of deviations can be played with magnitudes that are in range, one by one
-    /// ([`Competition::check_magnitudes`]). It may take a second.
+    /// Checks that the simulator can draw a season with this mismatch seed and these magnitudes, each of which is already known to be
+    /// in its range ([`Competition::check_magnitudes`]). It may take a second.
     ///
     /// # Errors
-    /// Why not, beginning with the name of a group.
+    /// The reason, which begins with the name of the group of magnitudes.
     fn check_season_magnitudes(
         &self,
         magnitudes: &Magnitudes,

@@ -55,8 +55,8 @@ impl CapacityMonitor {
         for stage in self.store.stages().await? {
             let forecast =
                 capacity::forecast(&self.store, &self.workers, &self.capacity, stage.id, now);
-            let overfull_days = forecast.await?.days.into_iter();
-            for load in overfull_days.filter(|load| load.fit == Fit::Not) {
+            let days = forecast.await?.days.into_iter();
+            for load in days.filter(|load| load.fit == Fit::Not) {
                 let day = StageDay {
                     stage: stage.id,
                     date: load.day,

@@ -30,7 +30,7 @@ const MAX_PROBES: usize = 16;
 pub(crate) struct InFlight {
     app: Arc<AppState>,
     places: Places,
-    /// Of readiness probes, which anyone can send: they take no places of teams.
+    /// Places of readiness probes. Anyone can send these, so they have places of their own.
     probes: Places,
 }
 
@@ -54,8 +54,8 @@ impl InFlight {
     }
 }
 
-/// Answers `Busy` when the limit for such callers is reached. Visitors' requests that only read also get `Busy` after a wait longer
-/// than [`MAX_WAIT`].
+/// Answers `Busy` when the limit for the caller's precedence is reached. Visitors' requests that only read also get `Busy` after a wait
+/// longer than [`MAX_WAIT`].
 pub(crate) async fn limit(
     State(in_flight): State<InFlight>,
     request: Request,

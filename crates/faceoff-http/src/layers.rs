@@ -51,7 +51,7 @@ pub(crate) fn wrap(site: Router, app: &Arc<AppState>) -> Router {
             in_flight::limit,
         ))
         .layer(middleware::from_fn_with_state(Arc::clone(app), limit_rate))
-        .layer(middleware::from_fn(tell_remaining_changes))
+        .layer(middleware::from_fn(add_change_quota_headers))
         .layer(middleware::from_fn(share_public_api))
         .layer(middleware::map_response(security_headers))
         .layer(PropagateRequestIdLayer::new(REQUEST_ID))
@@ -155,7 +155,7 @@ async fn share_public_api(request: Request, next: Next) -> Response {
 }
 
 /// Adds the headers about the team's quota of changes to the response to a change.
-async fn tell_remaining_changes(mut request: Request, next: Next) -> Response {
+async fn add_change_quota_headers(mut request: Request, next: Next) -> Response {
     if request.method().is_safe() {
         return next.run(request).await;
     }

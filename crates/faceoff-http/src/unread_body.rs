@@ -33,8 +33,8 @@ const MAX_DURATION: Duration = Duration::from_secs(300);
 /// How long a client may lag behind the minimum rate of uploads, at most. A client that sends nothing more is closed then.
 const MAX_GRACE: Duration = Duration::from_secs(5);
 
-/// Reads and discards what the handler has not read of the request's body. The response says `Connection: close` if that
-/// may be much.
+/// Reads and discards what the handler has not read of the request's body. The response has `Connection: close` if the
+/// rest is larger than [`MAX_REUSED_BYTES`], or of unknown length.
 pub(crate) async fn discard_unread(
     State(app): State<Arc<AppState>>,
     request: Request,
@@ -43,17 +43,17 @@ pub(crate) async fn discard_unread(
     if request.body().is_end_stream() {
         return next.run(request).await;
     }
-    // Such a client may not send the body at all, so the next bytes may be the body or another request.
+    // A client that sent `Expect: 100-continue` may not send the body at all, so the next bytes may be the body or another request.
     let is_optional = request.headers().contains_key(header::EXPECT);
-    let returned = Returned::default();
+    let return_slot = BodyReturnSlot::default();
     let request = request.map(|body| {
         Body::new(RequestBody {
             body,
-            returned: returned.clone(),
+            return_slot: return_slot.clone(),
         })
     });
     let mut response = next.run(request).await;
-    let Some(body) = returned.take() else {
+    let Some(body) = return_slot.take() else {
         return response;
     };
     let is_small = (body.size_hint().upper()).is_some_and(|bytes| bytes <= MAX_REUSED_BYTES);
@@ -62,7 +62,7 @@ pub(crate) async fn discard_unread(
         response.headers_mut().insert(header::CONNECTION, close);
     }
     let rate = app.config.limits.min_upload_rate;
-    let unread = Unread {
+    let unread = UnreadBody {
         body,
         rate: MinTransferRate {
             grace: rate.grace.min(MAX_GRACE),
@@ -79,9 +79,9 @@ pub(crate) async fn discard_unread(
 
 /// Where a request's body is put when its handler drops it before the end.
 #[derive(Debug, Clone, Default)]
-struct Returned(Arc<Mutex<Option<Body>>>);
+struct BodyReturnSlot(Arc<Mutex<Option<Body>>>);
 
-impl Returned {
+impl BodyReturnSlot {
     fn put(&self, body: Body) {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(body);
     }
@@ -95,7 +95,7 @@ impl Returned {
 #[derive(Debug)]
 struct RequestBody {
     body: Body,
-    returned: Returned,
+    return_slot: BodyReturnSlot,
 }
 
 impl HttpBody for RequestBody {
@@ -125,20 +125,20 @@ impl HttpBody for RequestBody {
 impl Drop for RequestBody {
     fn drop(&mut self) {
         if !self.body.is_end_stream() {
-            self.returned.put(std::mem::take(&mut self.body));
+            self.return_slot.put(std::mem::take(&mut self.body));
         }
     }
 }
 
 /// The rest of a request's body.
 #[derive(Debug)]
-struct Unread {
+struct UnreadBody {
     body: Body,
     /// The minimum rate at which it must arrive.
     rate: MinTransferRate,
 }
 
-impl Unread {
+impl UnreadBody {
     /// Reads the rest up to the limits. If it is longer, dropping it closes the connection.
     async fn discard(self) {
         let discarded = discard(self.body, self.rate, MAX_DISCARDED_BYTES);
@@ -152,7 +152,7 @@ impl Unread {
 #[derive(Debug)]
 struct ResponseBody {
     body: Body,
-    unread: Option<Unread>,
+    unread: Option<UnreadBody>,
 }
 
 impl ResponseBody {
@@ -218,7 +218,7 @@ mod tests {
                 Ok::<_, Infallible>(chunk)
             }
         });
-        let unread = Unread {
+        let unread = UnreadBody {
             body: Body::from_stream(chunks),
             rate: RATE,
         };

@@ -35,7 +35,7 @@ pub struct SlotMetrics {
     faults: Family<TaskLabels, Counter>,
     answer_times: Family<TaskLabels, Histogram, fn() -> Histogram>,
     round_trips: Family<RoundTripLabels, SecondsGauge>,
-    longest_stall: Family<SlotLabels, SecondsGauge>,
+    max_host_interference: Family<SlotLabels, SecondsGauge>,
     reruns: Counter,
     stuck_count: Gauge,
     /// Names of the stuck slots' threads.
@@ -130,7 +130,7 @@ impl SlotMetrics {
                 Unit::Seconds,
                 Family::default(),
             ),
-            longest_stall: registry.declare_with_unit(
+            max_host_interference: registry.declare_with_unit(
                 "host_stall",
                 "Longest delay of one answer by the host, of the slot's last shard",
                 Unit::Seconds,
@@ -183,7 +183,7 @@ impl SlotMetrics {
             let answer_times = self.answer_times.get_or_create_owned(&labels);
             answer_times.observe(outcome.computation_time.mean_s);
         }
-        self.reruns.inc_by(timing.host_noise_reruns.into());
+        self.reruns.inc_by(timing.host_interference_reruns.into());
         let RoundTrips { p50, p99, max, .. } = timing.before_s.worse(timing.during_s);
         for (of, seconds) in [("p50", p50), ("p99", p99), ("max", max)] {
             let slot = slot.to_owned();
@@ -192,9 +192,9 @@ impl SlotMetrics {
                 .set(seconds);
         }
         let slot = slot.to_owned();
-        self.longest_stall
+        self.max_host_interference
             .get_or_create(&SlotLabels { slot })
-            .set(timing.longest_stall_s);
+            .set(timing.max_host_interference_s);
     }
 }
 

@@ -5,7 +5,7 @@ mod positions;
 use super::frame::PageProblem;
 use axum::{extract::State, response::Response};
 use faceoff_api::views::ablation::AblationStatus;
-use faceoff_replay::EpisodeLine;
+use faceoff_replay::EpisodeIndexEntry;
 use faceoff_service::{
     app::App,
     csv::{CsvQuery, Table, escape_formula, or_empty},
@@ -32,7 +32,7 @@ pub(super) async fn episodes(
         .map(str::to_owned)
         .into();
     let has_positions =
-        view.episodes.is_empty() || view.episodes.iter().any(EpisodeLine::has_clips);
+        view.episodes.is_empty() || view.episodes.iter().any(EpisodeIndexEntry::has_clips);
     let mut suffixes = vec!["first_step", "steps", "worst"];
     if has_positions {
         columns.extend(positions::state_columns());
@@ -66,7 +66,7 @@ pub(super) async fn episodes(
             row.extend([
                 or_empty(violation.map(|violation| violation.from)),
                 or_empty(violation.map(|violation| violation.samples)),
-                or_empty(violation.map(|violation| violation.worst)),
+                or_empty(violation.map(|violation| violation.max_excess)),
             ]);
             if has_positions {
                 row.extend(positions::violation(violation));

@@ -1,7 +1,7 @@
 //! Outcomes and violations of episodes as text. A *violation* is a control step or more in which the robot exceeds a safety limit.
 
 use faceoff_replay::{
-    Constraint, Contact, ContactWith, EpisodeLine, OWN_GOAL, PUCK_TOO_FAST, SLOW_GOAL,
+    Constraint, Contact, ContactWith, EpisodeIndexEntry, OWN_GOAL, PUCK_TOO_FAST, SLOW_GOAL,
     ViolationSummary,
     model::{PUCK, TABLE},
 };
@@ -25,10 +25,10 @@ pub(super) fn describe_violation(
         .into_iter()
         .find(|constraint| constraint.name() == violation.constraint);
     let excess = match constraint {
-        Some(Constraint::Ee | Constraint::Link) => excess_text(1e3 * violation.worst, 1, "mm"),
-        Some(Constraint::JointPos) => excess_text(violation.worst, 4, "rad"),
-        Some(Constraint::JointVel) => excess_text(violation.worst, 3, "rad/s"),
-        None => format!("up to {:.3}", violation.worst),
+        Some(Constraint::Ee | Constraint::Link) => excess_text(1e3 * violation.max_excess, 1, "mm"),
+        Some(Constraint::JointPos) => excess_text(violation.max_excess, 4, "rad"),
+        Some(Constraint::JointVel) => excess_text(violation.max_excess, 3, "rad/s"),
+        None => format!("up to {:.3}", violation.max_excess),
     };
     let joint = match violation.joint {
         Some(joint) => format!(" of joint {joint}"),
@@ -48,7 +48,7 @@ pub(super) fn describe_violation(
 }
 
 /// Why an episode ended, as a plain sentence without numbers. The recorded description has the numbers.
-pub(super) fn plain_end(summary: &EpisodeLine, contacts: &[Contact]) -> String {
+pub(super) fn plain_end(summary: &EpisodeIndexEntry, contacts: &[Contact]) -> String {
     let task = summary.task.to_string();
     let end = summary.end.to_string();
     if summary.end == EpisodeEnd::AGENT_FAULT {

@@ -14,7 +14,7 @@ use crate::query::with_query;
 use askama::Template;
 use axum::{extract::State, response::Response};
 use faceoff_api::requests::{EpisodesQuery, ViolatedLimit};
-use faceoff_replay::EpisodeLine;
+use faceoff_replay::EpisodeIndexEntry;
 use faceoff_service::{
     app::App,
     extract::{PathParam, QueryParams},
@@ -183,7 +183,8 @@ pub(super) async fn page(
             .iter()
             .map(|info| option(&query.end, info.end.as_str(), &info.title))
             .collect(),
-        has_table: view.episodes.is_empty() || view.episodes.iter().any(EpisodeLine::has_clips),
+        has_table: view.episodes.is_empty()
+            || view.episodes.iter().any(EpisodeIndexEntry::has_clips),
         table: TableOutline::new(),
         start_maps: tasks
             .filter_map(|task| StartMap::new(task, &matching))

@@ -170,9 +170,9 @@ struct TimingFigures {
     before: RoundTripFigures,
     during: RoundTripFigures,
     /// Longest delay by host interference; `None` if none was measured.
-    longest_stall_ms: Option<String>,
+    max_host_interference_ms: Option<String>,
     /// Episodes repeated because of host interference.
-    host_noise_reruns: u32,
+    host_interference_reruns: u32,
     /// Restarts after a platform fault.
     platform_retries: u32,
 }
@@ -196,9 +196,9 @@ impl TimingFigures {
         Self {
             before: figures(timing.before_s),
             during: figures(timing.during_s),
-            longest_stall_ms: (timing.longest_stall_s > 0.0)
-                .then(|| format::milliseconds(timing.longest_stall_s)),
-            host_noise_reruns: timing.host_noise_reruns,
+            max_host_interference_ms: (timing.max_host_interference_s > 0.0)
+                .then(|| format::milliseconds(timing.max_host_interference_s)),
+            host_interference_reruns: timing.host_interference_reruns,
             platform_retries: timing.platform_retries,
         }
     }

@@ -12,8 +12,8 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use faceoff_api::{
-    pasted::secret_in,
     requests::{FoundedTeam, JoinRequest},
+    secret_extraction::extract_secret,
     token::hash_token,
     views::announcement::TermsView,
 };
@@ -122,7 +122,7 @@ async fn page_with(
     let now = app.config.clock.now();
     let found = app
         .store
-        .code_status(hash_token(secret_in(code)), now)
+        .code_status(hash_token(extract_secret(code)), now)
         .await;
     let offer = match found? {
         CodeStatus::Invitation(invitation, team) => match invitation.role {

@@ -98,7 +98,7 @@ impl ActionFormat {
     /// Converts a checked action to a command, and stores its last position in `commanded`, rad.
     pub fn command(&self, action: &[f64], commanded: &mut [f64; JOINTS], out: &mut [f64]) {
         let limit = self.limit();
-        let bound = |x: f64| if self.clip { x.clamp(-limit, limit) } else { x };
+        let clipped = |x: f64| if self.clip { x.clamp(-limit, limit) } else { x };
         let previous = *commanded;
         for (row, (input, command)) in action
             .chunks_exact(JOINTS)
@@ -107,11 +107,11 @@ impl ActionFormat {
         {
             let quantity = self.quantity(row);
             for joint in 0..JOINTS {
-                let fraction = bound(input[joint]);
+                let number = clipped(input[joint]);
                 command[joint] = match self.mode {
-                    ActionMode::Raw => fraction,
-                    ActionMode::Delta => scale(quantity, joint, fraction, Some(previous[joint])),
-                    ActionMode::Absolute => scale(quantity, joint, fraction, None),
+                    ActionMode::Raw => number,
+                    ActionMode::Delta => scale(quantity, joint, number, Some(previous[joint])),
+                    ActionMode::Absolute => scale(quantity, joint, number, None),
                 };
             }
             if matches!(quantity, Quantity::Position(_)) {

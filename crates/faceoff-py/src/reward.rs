@@ -30,7 +30,7 @@ pub fn potential(task: AirHockeyTask, episode: &Episode) -> f64 {
 }
 
 /// Penalty points of the constraints whose first violation in this episode was in the last step.
-pub fn new_points(before: ViolatedConstraints, after: ViolatedConstraints) -> f64 {
+pub fn new_penalty_points(before: ViolatedConstraints, after: ViolatedConstraints) -> f64 {
     [
         (before.ee, after.ee, EE_POINTS),
         (before.link, after.link, LINK_POINTS),

@@ -53,8 +53,8 @@ pub struct StepResult {
 }
 
 impl World {
-    /// A world at the start of an episode. Drawing a plant takes milliseconds; the plant of `previous` is used if it has
-    /// the same seed.
+    /// A world at the start of an episode. Drawing a plant takes milliseconds, so the plant of `previous` is reused if the new one
+    /// would be the same: with the same seed, or if the setup has a `mismatch_seed`.
     pub fn start(setup: &Setup, episode_start: EpisodeStart, previous: Option<&Self>) -> Self {
         let seed = Seed::from_number(episode_start.seed);
         let plant = match previous {
@@ -96,7 +96,7 @@ impl World {
         let potential = reward::potential(setup.task, &self.episode);
         let violations = self.episode.violations();
         let mut reward =
-            potential - self.potential - reward::new_points(self.violations, violations);
+            potential - self.potential - reward::new_penalty_points(self.violations, violations);
         if self.succeeds() {
             reward += reward::SUCCESS;
         }

@@ -59,7 +59,7 @@ def test_compiled_half_has_the_constants_of_the_plain_file() -> None:
     for name, value in constants.items():
         # The arc cosine of joint 2's bound comes from another library.
         assert value == pytest.approx(getattr(plain, name), rel=1e-15, abs=0.0), name
-    parameters = {"HAND_PER_REACH_RAD_M", "JOINT_BOUND_RAD", "TOLERANCE_M", "ITERATIONS", "DAMPING", "WEIGHT"}
+    parameters = {"HAND_PER_REACH_RAD_M", "JOINT_BOUND_RAD", "SOLUTION_TOLERANCE_M", "ITERATIONS", "DAMPING", "WEIGHT"}
     assert parameters <= set(constants)
 
 
@@ -154,7 +154,7 @@ class TestAgainstNumpyAndPlain:
         both = is_solved & numpy_solved
         assert both.sum() > 2000 and (is_solved != numpy_solved).mean() < 0.002
         assert (np.abs(q - numpy_result)[both].max(axis=1) > 1e-9).mean() < 0.03
-        np.testing.assert_allclose(arm.forward(q[is_solved]), points[is_solved], rtol=0.0, atol=plain.TOLERANCE_M)
+        np.testing.assert_allclose(arm.forward(q[is_solved]), points[is_solved], rtol=0.0, atol=plain.SOLUTION_TOLERANCE_M)
         assert (np.abs(q) <= BOUND + 1e-12).all()
         assert (arm.heights(q[is_solved]) > model.LINK_HEIGHT_M).all()
 

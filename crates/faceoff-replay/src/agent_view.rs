@@ -76,8 +76,7 @@ impl AgentView {
         }
     }
 
-    /// Number of observations so far.
-    pub fn observations(&self) -> usize {
+    pub fn observation_count(&self) -> usize {
         self.columns[OBSERVED_PUCK_COLUMN].counts.len()
     }
 

@@ -143,7 +143,7 @@ impl Analyzer {
         let (vx, vy) = (values("puck_vx"), values("puck_vy"));
         let positions = clip.puck_positions();
         let mut contacts = header.contacts.iter().peekable();
-        let mut rally_ends = header.breaks.iter().peekable();
+        let mut rally_ends = header.rally_ends.iter().peekable();
         // The first sample of a clip repeats the last one of the previous clip, or is the start.
         for (index, position) in positions.iter().enumerate().skip(1) {
             let sample = header.first + u32::try_from(index).unwrap_or(u32::MAX);
@@ -253,7 +253,7 @@ impl Analyzer {
             match previous {
                 Some(violation) if span.from == first + 1 => {
                     violation.last_sample = span.to;
-                    violation.max_excess = violation.max_excess.max(span.worst);
+                    violation.max_excess = violation.max_excess.max(span.max_excess);
                 }
                 _ => {
                     let index = span.from.saturating_sub(first) as usize;
@@ -262,7 +262,7 @@ impl Analyzer {
                         constraint: span.constraint,
                         first_sample: span.from,
                         last_sample: span.to,
-                        max_excess: span.worst,
+                        max_excess: span.max_excess,
                         mallet_position: clip.mallet_position(side, index).unwrap_or_default(),
                     });
                 }
@@ -324,7 +324,7 @@ mod tests {
     fn shot_before_the_rallys_goal_is_a_goal() {
         let mut game = clip(0, &[-0.5, -0.5, -0.2, 0.2, 0.6, -0.3, -0.3]);
         game.header.contacts = vec![contact(0.021, ContactWith::Mallet, -0.45)];
-        game.header.breaks = vec![goal(4, 0)];
+        game.header.rally_ends = vec![goal(4, 0)];
         let analysis = analyse(vec![game]);
         assert_eq!(analysis.shots.len(), 1);
         let shot = analysis.shots[0];
@@ -359,7 +359,7 @@ mod tests {
             contact(0.050, ContactWith::Rim, -0.3),
             contact(0.105, ContactWith::OpponentMallet, 0.6),
         ];
-        game.header.breaks = vec![goal(7, 0)];
+        game.header.rally_ends = vec![goal(7, 0)];
         let analysis = analyse(vec![game]);
         let shots: Vec<_> = analysis
             .shots
@@ -373,7 +373,7 @@ mod tests {
     #[test]
     fn goal_path_has_the_last_two_seconds() {
         let mut game = clip(0, &[-0.5; 300]);
-        game.header.breaks = vec![goal(250, 1)];
+        game.header.rally_ends = vec![goal(250, 1)];
         let analysis = analyse(vec![game]);
         assert_eq!(analysis.goals[0].positions.len(), GOAL_PATH_STEPS + 1);
     }
@@ -385,7 +385,7 @@ mod tests {
             contact(0.001, ContactWith::Mallet, -0.5),
             contact(0.050, ContactWith::OpponentMallet, 0.5),
         ];
-        game.header.breaks = vec![goal(4, 0)];
+        game.header.rally_ends = vec![goal(4, 0)];
         let analysis = analyse(vec![game]);
         assert_eq!(analysis.shots.len(), 1);
         assert!(analysis.shots[0].goal);
@@ -393,19 +393,19 @@ mod tests {
 
     #[test]
     fn shots_and_violations_continue_across_clips() {
-        let violation_span = |from, to, worst| ViolationSpan {
+        let violation_span = |from, to, max_excess| ViolationSpan {
             side: 1,
             constraint: Constraint::Ee,
             from,
             to,
-            worst,
+            max_excess,
         };
         let mut first = clip(0, &[0.5, 0.4, 0.1]);
         first.header.contacts = vec![contact(0.001, ContactWith::OpponentMallet, 0.5)];
         first.header.violations = vec![violation_span(2, 2, 0.01)];
         let mut second = clip(2, &[0.1, -0.1, -0.9]);
         second.header.violations = vec![violation_span(3, 4, 0.03)];
-        second.header.breaks = vec![goal(4, 1)];
+        second.header.rally_ends = vec![goal(4, 1)];
         let analysis = analyse(vec![first, second]);
         assert_eq!(
             analysis.steps, 4,

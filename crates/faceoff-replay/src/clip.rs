@@ -62,7 +62,7 @@ impl Clip {
     /// # Errors
     /// [`ReplayError::Unreadable`].
     pub fn read(compressed: &[u8]) -> Result<Self, ReplayError> {
-        let wrong = |reason: &dyn ToString| ReplayError::unreadable("this", reason.to_string());
+        let wrong = |reason: &dyn ToString| ReplayError::unreadable("the clip", reason.to_string());
         let mut bytes = Vec::new();
         GzDecoder::new(compressed)
             .take(MAX_BYTES)

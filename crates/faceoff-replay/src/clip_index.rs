@@ -21,7 +21,7 @@ const MAX_BYTES: u64 = 256 << 20;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ClipIndex {
     format: String,
-    pub episodes: Vec<EpisodeLine>,
+    pub episodes: Vec<EpisodeIndexEntry>,
     /// Histogram of computation times of all answered steps, by task.
     pub times: TaskMap<TimeBins>,
 }
@@ -36,10 +36,11 @@ impl Default for ClipIndex {
     }
 }
 
-/// The summary of an episode.
+/// The entry of an episode: its start, its end and its violations.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
-pub struct EpisodeLine {
+#[cfg_attr(feature = "openapi", schema(as = EpisodeLine))]
+pub struct EpisodeIndexEntry {
     /// The task.
     pub task: Task,
     /// Index of the episode within the evaluation.
@@ -55,13 +56,13 @@ pub struct EpisodeLine {
     pub end_description: String,
     /// True position and velocity of the puck at the start: x, y (m), vx, vy (m/s), table frame. Absent in other worlds than air
     /// hockey, whose episodes have no clips.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, rename = "start", skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "openapi", schema(nullable = false))]
-    pub start: Option<[f64; 4]>,
+    pub puck_at_start: Option<[f64; 4]>,
     /// True position and velocity of the puck at the end, as in `start`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, rename = "last", skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "openapi", schema(nullable = false))]
-    pub last: Option<[f64; 4]>,
+    pub puck_at_end: Option<[f64; 4]>,
     /// Violations, one entry per kind.
     #[serde(default, rename = "broken", skip_serializing_if = "Vec::is_empty")]
     pub violations: Vec<ViolationSummary>,
@@ -73,11 +74,11 @@ pub struct EpisodeLine {
     pub late_answers: u32,
 }
 
-impl EpisodeLine {
+impl EpisodeIndexEntry {
     /// Has the episode clips, so that it can be replayed?
     #[must_use]
     pub const fn has_clips(&self) -> bool {
-        self.start.is_some()
+        self.puck_at_start.is_some()
     }
 
     /// Removes what only those with access to the dataset may see: details of faults, and computation times.
@@ -110,7 +111,8 @@ pub struct ViolationSummary {
     /// Number of samples with a violation.
     pub samples: u32,
     /// Largest excess over the limit, such as rad, rad/s or m.
-    pub worst: f64,
+    #[serde(rename = "worst")]
+    pub max_excess: f64,
     /// Position of the end effector at the first sample: x, y (m), table frame; in air hockey.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "openapi", schema(nullable = false))]
@@ -123,12 +125,12 @@ pub struct ViolationSummary {
 impl ViolationSummary {
     /// The first sample with a violation; where it happened is not known.
     #[must_use]
-    pub const fn begin(constraint: ViolationName, from: u32, worst: f64) -> Self {
+    pub const fn begin(constraint: ViolationName, from: u32, max_excess: f64) -> Self {
         Self {
             constraint,
             from,
             samples: 1,
-            worst,
+            max_excess,
             at: None,
             joint: None,
         }
@@ -181,7 +183,7 @@ impl TimeBins {
 impl ClipIndex {
     /// The summary of an episode; `None` if the index has no such episode.
     #[must_use]
-    pub fn summary(&self, task: Task, episode: u32) -> Option<&EpisodeLine> {
+    pub fn summary(&self, task: Task, episode: u32) -> Option<&EpisodeIndexEntry> {
         let mut summaries = &self.episodes[..];
         // The summaries of a task follow each other.
         while let Some(first) = summaries.first() {

@@ -4,7 +4,7 @@
 use crate::{
     agent_view::AgentView,
     clip::Clip,
-    clip_index::{EpisodeLine, TimeBins, ViolationSummary},
+    clip_index::{EpisodeIndexEntry, TimeBins, ViolationSummary},
     constraint::Constraint,
     error::ReplayError,
     gzip::Gzip,
@@ -38,7 +38,7 @@ pub(crate) struct Recording {
 pub(crate) struct EpisodeClips {
     pub motion: Clip,
     pub observed: Clip,
-    pub summary: EpisodeLine,
+    pub summary: EpisodeIndexEntry,
 }
 
 impl Recording {
@@ -61,7 +61,7 @@ impl Recording {
 
     /// Records the first observation; later ones come with the steps.
     pub fn observe(&mut self, observation: &[f64]) {
-        if self.agent_view.observations() == 0 {
+        if self.agent_view.observation_count() == 0 {
             self.agent_view.observe(observation);
         }
     }
@@ -101,7 +101,7 @@ impl Recording {
             .find(|violation| violation.constraint == constraint.name())
         {
             violation.samples += 1;
-            violation.worst = violation.worst.max(value);
+            violation.max_excess = violation.max_excess.max(value);
             return;
         }
         let [x, y, _] = table_from_robot(0, state.ee);
@@ -130,30 +130,30 @@ impl Recording {
     /// The clips and the summary for the index. Adds the computation times to `times`.
     pub fn end(mut self, outcome: &EpisodeOutcome, times: &mut TimeBins) -> EpisodeClips {
         let fault = outcome.fault.as_ref().map(|fault| &fault.fault);
-        let reason = describe_end(outcome.task, outcome.end, &self.last, outcome.steps, fault);
-        let reason = escape_unprintable(&reason).into_owned();
+        let description = describe_end(outcome.task, outcome.end, &self.last, outcome.steps, fault);
+        let description = escape_unprintable(&description).into_owned();
         // Details of a fault are not public.
-        let public_reason = match outcome.fault {
+        let public_description = match outcome.fault {
             Some(_) => describe_end(outcome.task, outcome.end, &self.last, outcome.steps, None),
-            None => reason.clone(),
+            None => description.clone(),
         };
-        let end = |reason| EpisodeEndSummary {
+        let end = |description| EpisodeEndSummary {
             end: outcome.end,
             success: outcome.success,
-            description: reason,
+            description,
             steps: outcome.steps,
         };
         self.times_s.iter().for_each(|time_s| times.add(*time_s));
-        let (observed_columns, late, lost) = self.agent_view.take();
-        let summary = EpisodeLine {
+        let (observed_columns, late, tracking_gaps) = self.agent_view.take();
+        let summary = EpisodeIndexEntry {
             task: outcome.task,
             episode: outcome.episode,
             steps: outcome.steps,
             success: outcome.success,
             end: outcome.end,
-            end_description: reason.clone(),
-            start: Some(position_and_velocity(&self.start)),
-            last: Some(position_and_velocity(&self.last)),
+            end_description: description.clone(),
+            puck_at_start: Some(position_and_velocity(&self.start)),
+            puck_at_end: Some(position_and_velocity(&self.last)),
             violations: self.violations,
             longest_s: Some(self.times_s.iter().copied().fold(0.0, f64::max)),
             late_answers: u32::try_from(late.len()).unwrap_or(u32::MAX),
@@ -166,7 +166,7 @@ impl Recording {
             episode: Some(self.episode),
             contacts,
             violations: self.tracker.take(),
-            end: Some(end(public_reason)),
+            end: Some(end(public_description)),
             ..Header::new(
                 &contest(outcome.task),
                 0,
@@ -181,8 +181,8 @@ impl Recording {
                     contacts: Vec::new(),
                     violations: Vec::new(),
                     late,
-                    lost,
-                    end: Some(end(reason)),
+                    tracking_gaps,
+                    end: Some(end(description)),
                     ..header.clone()
                 },
                 columns: observed_columns,

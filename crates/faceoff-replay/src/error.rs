@@ -6,8 +6,8 @@ pub enum ReplayError {
     /// Reading or writing failed.
     #[error(transparent)]
     Io(#[from] std::io::Error),
-    /// The data is not a clip, or from another version.
-    #[error("{what} is not a clip that this version can read: {why}")]
+    /// The data is invalid, too large, or from another version.
+    #[error("{what} cannot be read or written by this version: {why}")]
     Unreadable {
         /// The file or clip.
         what: String,

@@ -105,13 +105,13 @@ impl Chunk {
         let header = Header::new("game", first, self.last - first + 1);
         let [home, away] = self.sides;
         let view_clip = |side: u32, view: AgentView| {
-            let (columns, late, lost) = view.take();
+            let (columns, late, tracking_gaps) = view.take();
             Clip {
                 header: Header {
                     kind: ClipKind::Observed,
                     side: Some(side),
                     late,
-                    lost,
+                    tracking_gaps,
                     ..header.clone()
                 },
                 columns,
@@ -129,7 +129,7 @@ impl Chunk {
             header: Header {
                 contacts,
                 violations,
-                breaks: self.rally_ends,
+                rally_ends: self.rally_ends,
                 score: Some(self.score[0]),
                 ..header
             },

@@ -48,8 +48,8 @@ pub struct Header {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub violations: Vec<ViolationSpan>,
     /// Ends of rallies of a game.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub breaks: Vec<RallyEndEvent>,
+    #[serde(default, rename = "breaks", skip_serializing_if = "Vec::is_empty")]
+    pub rally_ends: Vec<RallyEndEvent>,
     /// In games: the score at the first sample.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub score: Option<[u32; 2]>,
@@ -57,8 +57,8 @@ pub struct Header {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub late: Vec<u32>,
     /// Spans in which the simulated tracking had lost the puck.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub lost: Vec<TrackingGap>,
+    #[serde(default, rename = "lost", skip_serializing_if = "Vec::is_empty")]
+    pub tracking_gaps: Vec<TrackingGap>,
     /// How an episode ended.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub end: Option<EpisodeEndSummary>,
@@ -79,10 +79,10 @@ impl Header {
             columns: Vec::new(),
             contacts: Vec::new(),
             violations: Vec::new(),
-            breaks: Vec::new(),
+            rally_ends: Vec::new(),
             score: None,
             late: Vec::new(),
-            lost: Vec::new(),
+            tracking_gaps: Vec::new(),
             end: None,
         }
     }
@@ -142,7 +142,8 @@ pub struct ViolationSpan {
     /// The last sample of the violation.
     pub to: u32,
     /// Largest excess over the limit: rad, rad/s or m.
-    pub worst: f64,
+    #[serde(rename = "worst")]
+    pub max_excess: f64,
 }
 
 /// The end of a rally; the next sample is the first of the next rally.

@@ -20,16 +20,16 @@ mod header;
 pub mod model;
 mod motion;
 mod pack;
-mod plain_episode;
 mod positions;
 mod recorder;
+mod summary_recording;
 #[cfg(test)]
 mod viewer_model;
 mod violations;
 
 pub use analysis::*;
 pub use clip::Clip;
-pub use clip_index::{ClipIndex, EpisodeLine, TimeBins, ViolationSummary};
+pub use clip_index::{ClipIndex, EpisodeIndexEntry, TimeBins, ViolationSummary};
 pub use column::Column;
 pub use constraint::Constraint;
 pub use end_reasons::*;

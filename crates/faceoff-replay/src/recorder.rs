@@ -6,7 +6,7 @@ use crate::{
     error::ReplayError,
     gzip::Gzip,
     pack::{ClipKey, PackWriter},
-    plain_episode::PlainRecording,
+    summary_recording::SummaryRecording,
 };
 use faceoff_episode::{EpisodeStart, RecordError, StepRow, StepSink};
 use faceoff_types::{Competition, EpisodeOutcome, Task};
@@ -28,7 +28,7 @@ enum Current {
     /// With clips.
     AirHockey(Box<Recording>),
     /// In another world: a summary without clips.
-    Plain(PlainRecording),
+    SummaryOnly(SummaryRecording),
 }
 
 impl<W> std::fmt::Debug for ClipRecorder<W> {
@@ -72,7 +72,7 @@ impl<W: Write> ClipRecorder<W> {
         let times = self.index.times.entry(self.task).or_default();
         let recording = match recording {
             Current::AirHockey(recording) => *recording,
-            Current::Plain(recording) => {
+            Current::SummaryOnly(recording) => {
                 let summary = recording.end(outcome, &self.competition, times);
                 self.index.episodes.push(summary);
                 return Ok(());
@@ -94,7 +94,7 @@ impl<W: Write> StepSink for ClipRecorder<W> {
     fn begin(&mut self, start: EpisodeStart<'_>) {
         let recording = Recording::begin(&start).map(Box::new);
         self.current = Some(recording.map_or_else(
-            || Current::Plain(PlainRecording::default()),
+            || Current::SummaryOnly(SummaryRecording::default()),
             Current::AirHockey,
         ));
     }
@@ -108,7 +108,7 @@ impl<W: Write> StepSink for ClipRecorder<W> {
     fn step(&mut self, row: &StepRow<'_>) {
         match &mut self.current {
             Some(Current::AirHockey(recording)) => recording.step(row),
-            Some(Current::Plain(recording)) => recording.step(row, &self.competition),
+            Some(Current::SummaryOnly(recording)) => recording.step(row, &self.competition),
             None => {}
         }
     }

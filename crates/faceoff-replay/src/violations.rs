@@ -22,10 +22,10 @@ impl ViolationTracker {
                     constraint,
                     from: sample,
                     to: sample,
-                    worst: value,
+                    max_excess: value,
                 });
                 span.to = sample;
-                span.worst = span.worst.max(value);
+                span.max_excess = span.max_excess.max(value);
             } else {
                 self.finished.extend(current.take());
             }

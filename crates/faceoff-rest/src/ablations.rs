@@ -130,7 +130,7 @@ async fn send_episode(
 ///
 /// Its jobs run when no job that counts is pending.
 #[utoipa::path(
-    post, path = "/submissions/{id}/ablation", tag = "organiser", security(("organiser" = [])),
+    post, operation_id = "order_ablation", path = "/submissions/{id}/ablation", tag = "organiser", security(("organiser" = [])),
     params(("id" = SubmissionId, Path)),
     request_body(content = Option<NewAblation>, content_type = "application/json"),
     responses(
@@ -140,7 +140,7 @@ async fn send_episode(
         (status = 422),
     )
 )]
-pub(crate) async fn order_ablation(
+pub(crate) async fn start_ablation(
     organiser: Organiser,
     State(app): State<App>,
     PathParam(id): PathParam<SubmissionId>,

@@ -28,7 +28,8 @@ use faceoff_types::{GameId, TeamId, TournamentId};
 /// Queues test games of active submissions against the baseline. A team can request them for its own submission, within its
 /// daily quota; organisers for any entrants, without a quota.
 #[utoipa::path(
-    post, path = "/tournaments/{id}/test-games", tag = "team", security(("team" = []), ("organiser" = [])),
+    post, operation_id = "order_test_games", path = "/tournaments/{id}/test-games", tag = "team",
+    security(("team" = []), ("organiser" = [])),
     params(("id" = TournamentId, Path)),
     request_body(content = Option<NewTestGames>, content_type = "application/json"),
     responses(
@@ -39,7 +40,7 @@ use faceoff_types::{GameId, TeamId, TournamentId};
         (status = 429, description = "the team's daily game quota is used up"),
     )
 )]
-pub(crate) async fn order_test_games(
+pub(crate) async fn request_test_games(
     caller: Caller,
     State(app): State<App>,
     PathParam(id): PathParam<TournamentId>,
@@ -120,7 +121,7 @@ async fn baseline_team(app: &App, state: &TournamentState) -> Result<Option<Team
 
 /// Queues a friendly game of the calling team's active submission, which plays on the home side, against another team's.
 #[utoipa::path(
-    post, path = "/tournaments/{id}/friendly-games", tag = "team", security(("team" = [])),
+    post, operation_id = "order_friendly_game", path = "/tournaments/{id}/friendly-games", tag = "team", security(("team" = [])),
     params(("id" = TournamentId, Path)), request_body = NewFriendlyGame,
     responses(
         (status = 201, body = GameView, headers(("Location" = String, description = "path of the game"))),
@@ -130,7 +131,7 @@ async fn baseline_team(app: &App, state: &TournamentState) -> Result<Option<Team
         (status = 429, description = "the team's daily game quota is used up"),
     )
 )]
-pub(crate) async fn order_friendly_game(
+pub(crate) async fn request_friendly_game(
     caller: TeamCaller,
     State(app): State<App>,
     PathParam(id): PathParam<TournamentId>,

@@ -39,7 +39,7 @@ use faceoff_types::{GameId, Side};
     responses(
         (status = 200, body = inline(Binary), content_type = "application/zip"),
         (status = 401), (status = 403), (status = 404),
-        (status = 409, description = "the game has no result or no recording; games of a repetition of the schedule are not recorded"),
+        (status = 409, description = "the game has no result or no recording; games of a schedule replay are not recorded"),
         (status = 410, description = "the link has expired, or the season archive does not contain the file"),
     )
 )]
@@ -63,7 +63,7 @@ pub(crate) async fn side(
     responses(
         (status = 200, body = inline(Binary), content_type = "application/zip"),
         (status = 401), (status = 403), (status = 404),
-        (status = 409, description = "the game has no result or no recording; games of a repetition of the schedule are not recorded"),
+        (status = 409, description = "the game has no result or no recording; games of a schedule replay are not recorded"),
         (status = 410, description = "the link has expired, or the season archive does not contain the file"),
     )
 )]
@@ -185,7 +185,7 @@ fn stored_recording(game: &Game) -> Result<&GameRecording, Problem> {
         GameState::Played(result) => result.recording.as_ref().ok_or_else(|| {
             Problem::new(
                 ProblemKind::Conflict,
-                "games of a repetition of the schedule are not recorded; the game that counts has a recording",
+                "games of a schedule replay are not recorded; the game that counts has a recording",
             )
         }),
         _ => Err(no_result(game)),

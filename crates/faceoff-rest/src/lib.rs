@@ -233,7 +233,7 @@ fn submission_routes() -> OpenApiRouter<App> {
         .routes(routes!(submissions::withdraw_submission))
         .routes(routes!(submissions::activate_submission))
         .routes(routes!(submissions::evaluate_submission))
-        .routes(routes!(ablations::ablation, ablations::order_ablation))
+        .routes(routes!(ablations::ablation, ablations::start_ablation))
         .routes(routes!(ablations::ablation_motion))
         .routes(routes!(ablations::ablation_observed))
 }
@@ -273,11 +273,11 @@ fn tournament_routes() -> OpenApiRouter<App> {
         .routes(routes!(tournaments::pause_tournament))
         .routes(routes!(tournaments::resume_tournament))
         .routes(routes!(tournaments::close_tournament))
-        .routes(routes!(friendly_games::order_test_games))
-        .routes(routes!(friendly_games::order_friendly_game))
+        .routes(routes!(friendly_games::request_test_games))
+        .routes(routes!(friendly_games::request_friendly_game))
         .routes(routes!(friendly_games::list_uncounted_games))
         .routes(routes!(
-            schedule_replays::order_replays,
+            schedule_replays::start_replays,
             schedule_replays::cancel_replays
         ))
         .routes(routes!(schedule_replays::certainty))

@@ -17,7 +17,7 @@ use faceoff_types::TournamentId;
 ///
 /// Replays never count, are not recorded, and run behind all games that count.
 #[utoipa::path(
-    post, path = "/tournaments/{id}/replays", tag = "organiser", security(("organiser" = [])),
+    post, operation_id = "order_replays", path = "/tournaments/{id}/replays", tag = "organiser", security(("organiser" = [])),
     params(("id" = TournamentId, Path)), request_body = NewScheduleReplays,
     responses(
         (status = 201, body = ChampionSharesView),
@@ -26,7 +26,7 @@ use faceoff_types::TournamentId;
         (status = 422),
     )
 )]
-pub(crate) async fn order_replays(
+pub(crate) async fn start_replays(
     organiser: Organiser,
     State(app): State<App>,
     PathParam(id): PathParam<TournamentId>,

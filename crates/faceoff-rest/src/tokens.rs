@@ -85,7 +85,7 @@ pub(crate) async fn rotate_token(
 }
 
 /// Revokes a token, or ends a session. Unless it is your own, the tokens, invitations and webhooks that were created with it
-/// end, too. `made` decides otherwise: `keep` or `end`.
+/// end, too. The query parameter `made` overrides this: `keep` keeps them, `end` ends them.
 #[utoipa::path(
     delete, path = "/tokens/{id}", tag = "people", security(("team" = []), ("organiser" = [])),
     params(("id" = TokenId, Path), requests::RevocationQuery),

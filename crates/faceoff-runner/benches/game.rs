@@ -1,5 +1,5 @@
 //! A whole recorded game of 45,000 control steps between two compiled agents that answer at once, each in its sandbox:
-//! its duration, and the share of this thread. `STEPS=5000` runs a shorter game; `SHOWN=1` adds the live feed, as on a
+//! its duration, and the share of this thread. `STEPS=5000` runs a shorter game; `LIVE_FEED=1` adds the live feed, as on a
 //! server with viewers.
 //!
 //! The agents are this program, started with `--agent`.
@@ -88,7 +88,7 @@ fn main() {
     );
     let (started_at, cpu_time_before_s) = (Instant::now(), cpu_time_s());
     let bundles = [&agent.bundle; 2];
-    let mut sink = std::env::var_os("SHOWN").map(|_| CollectingSink::default());
+    let mut sink = std::env::var_os("LIVE_FEED").map(|_| CollectingSink::default());
     let report = match &mut sink {
         Some(sink) => {
             let mut feed = LiveFeed::new(sink, POSITION_INTERVAL);

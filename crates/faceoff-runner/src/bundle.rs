@@ -45,7 +45,8 @@ pub struct Bundle {
 /// Unpacks an archive into the folder `target_dir`, which is created and must be empty.
 ///
 /// The first bytes determine the format: `.tar.gz`, `.tar.zst` or `.zip`. A tar, plain or compressed, without
-/// `agent.toml` may be a container image, as written by `docker save` or in an OCI layout. It becomes the image's root.
+/// `agent.toml` may be a container image, as written by `docker save` or in an OCI layout. Its layers are
+/// then merged into a root folder inside `target_dir`.
 ///
 /// Files get mode 0644, or 0755 if the archive has an executable bit. Symbolic links stay links if they lead to a path
 /// inside the bundle.

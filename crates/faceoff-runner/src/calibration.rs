@@ -121,15 +121,15 @@ impl Calibration {
 
     pub fn finish(
         mut self,
-        longest_stall_s: f64,
-        host_noise_reruns: u32,
+        max_host_interference_s: f64,
+        host_interference_reruns: u32,
         platform_retries: u32,
     ) -> SlotTiming {
         SlotTiming {
             before_s: summarise(&mut self.times_before_s),
             during_s: summarise(&mut self.times_between_s),
-            longest_stall_s,
-            host_noise_reruns,
+            max_host_interference_s,
+            host_interference_reruns,
             platform_retries,
         }
     }

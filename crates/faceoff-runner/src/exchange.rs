@@ -397,14 +397,20 @@ impl<'w> Exchange<'w> {
             wait.baseline_cpus(),
             answer,
         );
-        let evaluator = self.evaluator_cpus.as_deref().zip(wait.baseline_caller());
+        let evaluator = self
+            .evaluator_cpus
+            .as_deref()
+            .zip(wait.baseline_evaluator());
         let counters = WaitCounters {
             now,
             run_delay: interference.map(|interference| interference.run_delay),
             stolen: interference.map_or(Duration::ZERO, |interference| interference.stolen),
             agent_run_time: run_time_s.map(TimeLimits::duration),
-            evaluator_run_delay: evaluator
-                .map(|(cpus, before)| self.process.caller_counters(cpus).run_delay_since(before)),
+            evaluator_run_delay: evaluator.map(|(cpus, before)| {
+                self.process
+                    .evaluator_counters(cpus)
+                    .run_delay_since(before)
+            }),
         };
         wait.interference(self.monitor, counters)
     }

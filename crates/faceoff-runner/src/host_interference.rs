@@ -2,15 +2,15 @@
 //! run. It is as much as the kernel's counters prove, and is determined for late answers only. Before an answer is
 //! late, only a baseline (the counters before the question) is read, which costs a few microseconds.
 
-use faceoff_sandbox::{Baseline, CallerCounters, CpuReading, CpuSamples};
+use faceoff_sandbox::{Baseline, CpuReading, CpuSamples, EvaluatorCounters};
 use std::{
     sync::Arc,
     time::{Duration, Instant},
 };
 
-/// After this time an answer is late, and the counters are sampled. It is half of the shortest time that costs points.
-/// It is also the maximum lag of the kernel's counters, so that everything that a sample counts happened after the
-/// question.
+/// After this time the counters are sampled. In this module such an answer is called late; by the rules an answer is late only
+/// after 20 ms, the control step. The time is half of the shortest one that costs points. It is also the maximum lag of the
+/// kernel's counters, so that everything that a sample counts happened after the question.
 pub(crate) const LATE_AFTER: Duration = Duration::from_millis(10);
 /// Interval at which the evaluator wakes while an answer is late, so that its own lateness can be measured.
 pub(crate) const SAMPLE_INTERVAL: Duration = Duration::from_millis(5);
@@ -124,8 +124,8 @@ impl AnswerWait {
     }
 
     /// Counters of the evaluator's own thread before the question.
-    pub fn baseline_caller(&self) -> Option<&CallerCounters> {
-        self.baseline.as_ref()?.caller.as_ref()
+    pub fn baseline_evaluator(&self) -> Option<&EvaluatorCounters> {
+        self.baseline.as_ref()?.evaluator.as_ref()
     }
 
     /// Samples of the counters since the answer is late.

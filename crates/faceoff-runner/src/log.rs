@@ -44,8 +44,8 @@ impl Log {
     }
 }
 
-/// The text as a terminal shows it: without colours and other escape sequences, and of a line that was written several times, such as a
-/// progress bar, the last state.
+/// The text as a terminal shows it: without colours and other escape sequences. Of a line that was overwritten, such as a progress bar,
+/// only the last state remains.
 fn as_terminal(text: &str) -> Cow<'_, str> {
     if !text.contains(['\u{1b}', '\r', '\u{8}']) {
         return Cow::Borrowed(text);

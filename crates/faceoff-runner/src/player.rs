@@ -29,7 +29,7 @@ pub(crate) struct Player<'a> {
     monitor: &'a dyn InterferenceMonitor,
     reruns: Reruns,
     /// Longest host interference in one answer, in seconds.
-    longest_stall_s: f64,
+    max_host_interference_s: f64,
     /// The wait whose timeout ended the last episode.
     last_wait: Option<WaitBreakdown>,
     on_host_interference: OnHostInterference,
@@ -122,10 +122,10 @@ impl<'a> Player<'a> {
             monitor,
             reruns: Reruns {
                 count: 0,
-                limit: env.time.max_host_noise_reruns(episodes),
-                per_episode: env.time.host_noise_reruns,
+                limit: env.time.max_host_interference_reruns(episodes),
+                per_episode: env.time.host_interference_reruns,
             },
-            longest_stall_s: 0.0,
+            max_host_interference_s: 0.0,
             last_wait: None,
             on_host_interference,
         }
@@ -137,13 +137,13 @@ impl<'a> Player<'a> {
     }
 
     /// Number of tries dropped so far because of host interference.
-    pub const fn host_noise_reruns(&self) -> u32 {
+    pub const fn host_interference_reruns(&self) -> u32 {
         self.reruns.count
     }
 
     /// Longest host interference in one answer, in seconds.
-    pub const fn longest_stall_s(&self) -> f64 {
-        self.longest_stall_s
+    pub const fn max_host_interference_s(&self) -> f64 {
+        self.max_host_interference_s
     }
 
     /// Runs one episode of at most `max_steps` control steps. Repeats it while host interference ends it and the limits
@@ -161,7 +161,7 @@ impl<'a> Player<'a> {
     ) -> Result<EpisodeOutcome, PlatformFault> {
         let mut reruns = 0;
         loop {
-            let Try { outcome, blame } = self.attempt(episode, max_steps, sink, cancelled)?;
+            let Try { outcome, blame } = self.run_try(episode, max_steps, sink, cancelled)?;
             self.last_wait = match blame {
                 Blame::Agent => None,
                 Blame::AgentTimeout(wait) | Blame::Host(wait) => Some(wait),
@@ -193,7 +193,7 @@ impl<'a> Player<'a> {
     }
 
     /// Runs one try of an episode, and starts the agent if it is not running.
-    fn attempt(
+    fn run_try(
         &mut self,
         episode: u32,
         max_steps: u32,
@@ -249,7 +249,7 @@ impl<'a> Player<'a> {
     }
 
     /// Sends `bye` to the agent and returns the log of all its processes.
-    pub fn close(mut self) -> Result<String, PlatformFault> {
+    pub fn finish(mut self) -> Result<String, PlatformFault> {
         if let Some(session) = self.session.take() {
             let stderr = session.finish()?;
             self.log.add(&stderr, None);
@@ -335,7 +335,7 @@ impl<'a> Player<'a> {
             }
             let ActionRequest { step, observation } = running.action_request()?;
             let timing = session.step(step, observation)?;
-            self.longest_stall_s = self.longest_stall_s.max(timing.host_time_s);
+            self.max_host_interference_s = self.max_host_interference_s.max(timing.host_time_s);
             if let Some(outcome) = running.answer(session.action(), timing)? {
                 return Ok(outcome);
             }

@@ -24,16 +24,16 @@ pub struct Session<'w> {
     time: TimeLimits,
     layout: ActionLayout,
     startup_s: f64,
-    pending: Option<PendingAnswer>,
+    pending: Option<SentQuestion>,
     /// The last action; its memory is reused.
     action: Vec<f64>,
 }
 
-/// A question whose answer is pending.
+/// The question that was sent last, until its answer arrives.
 #[derive(Debug, Clone)]
-struct PendingAnswer {
+struct SentQuestion {
     question: Question,
-    sent: PendingQuestion,
+    pending_question: PendingQuestion,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -139,8 +139,11 @@ impl<'w> Session<'w> {
             Question::Step { .. } => (Phase::Step, self.time.step_s),
         };
         self.pending = None;
-        let sent = self.exchange.send(message, phase, limit_s)?;
-        self.pending = Some(PendingAnswer { question, sent });
+        let pending_question = self.exchange.send(message, phase, limit_s)?;
+        self.pending = Some(SentQuestion {
+            question,
+            pending_question,
+        });
         Ok(())
     }
 
@@ -148,7 +151,7 @@ impl<'w> Session<'w> {
     /// charged for it if its answer is available at the next check.
     pub fn add_absence(&mut self, absence: Duration) {
         if let Some(pending) = &mut self.pending {
-            pending.sent.add_absence(absence);
+            pending.pending_question.add_absence(absence);
         }
     }
 
@@ -177,7 +180,12 @@ impl<'w> Session<'w> {
     pub fn wait_for_any(sessions: &[&Self], deadline: Instant) -> Result<(), PlatformFault> {
         let pending: Vec<_> = sessions
             .iter()
-            .filter_map(|session| Some((&session.exchange, &session.pending.as_ref()?.sent)))
+            .filter_map(|session| {
+                Some((
+                    &session.exchange,
+                    &session.pending.as_ref()?.pending_question,
+                ))
+            })
             .collect();
         Exchange::wait_for_any(&pending, deadline)
     }
@@ -188,13 +196,20 @@ impl<'w> Session<'w> {
     /// # Errors
     /// An agent fault, e.g. a timeout, or a platform fault.
     pub fn poll(&mut self, deadline: Instant) -> Result<Option<AnswerTiming>, SessionError> {
-        let Some(PendingAnswer { question, mut sent }) = self.pending.take() else {
+        let Some(SentQuestion {
+            question,
+            mut pending_question,
+        }) = self.pending.take()
+        else {
             return Ok(None);
         };
-        match self.exchange.poll(&mut sent, deadline)? {
+        match self.exchange.poll(&mut pending_question, deadline)? {
             Some(answer) => self.parse_answer(question, &answer).map(Some),
             None => {
-                self.pending = Some(PendingAnswer { question, sent });
+                self.pending = Some(SentQuestion {
+                    question,
+                    pending_question,
+                });
                 Ok(None)
             }
         }

@@ -22,8 +22,8 @@ pub trait Observer {
     /// The end of the agent's standard error with its faults. Called exactly once, even if there is no report because
     /// the shard was cancelled or the platform failed.
     fn log(&mut self, _log: &str) {}
-    /// The agent has answered `hello`. Called before each reset and each step, so it must be cheap.
-    fn on_answer(&self) {}
+    /// The agent runs: it has answered `hello`. Called again before each reset and each step, so it must be cheap.
+    fn on_agent_running(&self) {}
     /// Should the shard stop? Called before each reset and each step, so it must be cheap.
     fn cancelled(&self) -> bool;
 }
@@ -106,11 +106,11 @@ pub fn play_shard(
         }
     };
     let timing = calibration.finish(
-        player.longest_stall_s(),
-        player.host_noise_reruns(),
+        player.max_host_interference_s(),
+        player.host_interference_reruns(),
         spec.platform_retries,
     );
-    let log = player.close()?;
+    let log = player.finish()?;
     observer.log(&log);
     Ok(ShardReport {
         outcomes,
@@ -136,7 +136,7 @@ fn play(
             return Err(PlatformFault::Cancelled);
         }
         let outcome = player.play(episode, max_steps, sink, &|| {
-            observer.on_answer();
+            observer.on_agent_running();
             observer.cancelled()
         })?;
         calibration.measure_between_episodes()?;

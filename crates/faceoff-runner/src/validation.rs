@@ -161,7 +161,7 @@ pub fn validate_monitored(
                 }
             }
             wait = player.last_wait();
-            log.add(&player.close()?, None);
+            log.add(&player.finish()?, None);
         }
         let (host_mean_s, cpu_mean_s) = answers.mean_host_and_cpu_s();
         let summary = answers.summary(task, &outcomes);
@@ -218,8 +218,8 @@ impl TaskPlan {
     }
 }
 
-/// The shards of an evaluation, from a drawn one on; after the last comes the first. The protocol sends the number of an episode to the
-/// agent, so these are the numbers of a shard.
+/// The shards of an evaluation, starting at a random one; after the last follows the first. The protocol tells the agent each episode's
+/// number, so a validation run uses the numbers of an evaluation's shards.
 struct Shards {
     episodes_per_task: u32,
     episodes_per_shard: u32,
@@ -322,7 +322,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn episodes_are_those_of_shards() {
+    fn next_episodes_wraps_around_after_the_last_shard() {
         let mut shards = Shards {
             episodes_per_task: 12,
             episodes_per_shard: 5,

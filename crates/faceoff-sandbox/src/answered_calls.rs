@@ -61,8 +61,8 @@ const MAX_SOCKETS: i32 = 256;
 /// Longest mask of CPUs that is read, in bytes.
 const MAX_MASK_BYTES: usize = 128;
 
-/// CPU time of all answers without a pause.
-const QUICK_ANSWERS: Duration = Duration::from_millis(20);
+/// CPU time after which the thread pauses before each further answer.
+const UNTHROTTLED_CPU_TIME: Duration = Duration::from_millis(20);
 /// Minimum pause before each further answer.
 const PAUSE: Duration = Duration::from_millis(1);
 /// The pause is at least this multiple of the CPU time of the last answer: an agent can make an answer expensive, by memory that has no
@@ -71,21 +71,21 @@ const PAUSE_PER_CPU_TIME: u32 = 20;
 
 /// The filter, and the socket through which the child sends the *listener* (the file descriptor that reports its calls).
 #[derive(Debug)]
-pub(crate) struct AnsweredCalls {
+pub(crate) struct CallFilter {
     program: BpfProgram,
     child_socket: OwnedFd,
 }
 
 /// The service's side before the agent has started.
 #[derive(Debug)]
-pub(crate) struct CallAnswerer {
+pub(crate) struct CallHandlerSetup {
     socket: OwnedFd,
-    answers: Answers,
+    values: EmulatedValues,
 }
 
-impl AnsweredCalls {
+impl CallFilter {
     /// Both sides for one agent.
-    pub(crate) fn new(spec: &SpawnSpec) -> Result<(Self, CallAnswerer), SandboxError> {
+    pub(crate) fn new(spec: &SpawnSpec) -> Result<(Self, CallHandlerSetup), SandboxError> {
         let (socket, child_socket) = socketpair(
             AddressFamily::UNIX,
             SocketType::STREAM,
@@ -95,9 +95,9 @@ impl AnsweredCalls {
         .context("cannot make a socket for the agent's system calls")?;
         let cpus = CpuNumbers::new(spec);
         let program = seccomp::answered_calls(cpus.is_renumbered())?;
-        let answers = Answers {
-            file_system: file_system(free_blocks(spec.limits.scratch_bytes)),
-            system: system(MemoryView::new(spec)),
+        let values = EmulatedValues {
+            statfs_fields: statfs_fields(free_blocks(spec.limits.scratch_bytes)),
+            sysinfo_fields: sysinfo_fields(MemoryView::new(spec)),
             cpus,
             has_namespaces: spec.isolation.enforces(Layer::Namespaces),
         };
@@ -106,7 +106,7 @@ impl AnsweredCalls {
                 program,
                 child_socket,
             },
-            CallAnswerer { socket, answers },
+            CallHandlerSetup { socket, values },
         ))
     }
 
@@ -130,36 +130,37 @@ impl AnsweredCalls {
     }
 }
 
-impl CallAnswerer {
+impl CallHandlerSetup {
     /// Starts the thread that answers, once the child has installed its filter.
-    pub(crate) fn start(self) -> Result<AnswerThread, SandboxError> {
+    pub(crate) fn start(self) -> Result<CallHandlerThread, SandboxError> {
         const ACTION: &str = "cannot watch the agent's system calls";
         let listener = receive_listener(&self.socket).context(ACTION)?;
-        let answers = self.answers;
+        let values = self.values;
         let thread = std::thread::Builder::new()
             .name("agent-calls".into())
             .spawn(move || {
                 block_signals();
-                let mut answerer = Answerer {
+                let mut call_handler = CallHandler {
                     listener: &listener,
-                    answers,
+                    values,
                     sessions: SessionBudget::new(Instant::now()),
                     locks: FileLocks::default(),
                 };
-                answerer.answer_calls();
-                session_numbers::skip_some(answerer.sessions.started);
+                call_handler.answer_calls();
+                session_numbers::skip_some(call_handler.sessions.started);
             })
             .context(ACTION)?;
-        Ok(AnswerThread(thread))
+        Ok(CallHandlerThread(thread))
     }
 }
 
 /// The thread that answers, which ends after the last process of the agent.
 #[derive(Debug)]
-pub(crate) struct AnswerThread(JoinHandle<()>);
+pub(crate) struct CallHandlerThread(JoinHandle<()>);
 
-impl AnswerThread {
-    /// Waits until sessions have been skipped, before another agent starts. Call it when the process tree is dead.
+impl CallHandlerThread {
+    /// Waits until the thread has used up some session numbers of the host ([`session_numbers::skip_some`]), before another agent
+    /// starts. Call it when the process tree is dead.
     pub(crate) fn join(self, deadline: Instant) {
         while !self.0.is_finished() && Instant::now() < deadline {
             std::thread::sleep(Duration::from_millis(1));
@@ -204,11 +205,11 @@ fn receive_listener(socket: &OwnedFd) -> io::Result<OwnedFd> {
         .ok_or_else(|| io::Error::other("the child has sent no descriptor"))
 }
 
-/// What an agent is answered.
+/// Values that calls return to an agent in place of the host's.
 #[derive(Debug)]
-struct Answers {
-    file_system: [u64; 15],
-    system: [u64; 14],
+struct EmulatedValues {
+    statfs_fields: [u64; 15],
+    sysinfo_fields: [u64; 14],
     cpus: CpuNumbers,
     /// Are its scratch folders and its network its own?
     has_namespaces: bool,
@@ -216,7 +217,7 @@ struct Answers {
 
 /// The answer of `statfs` and `fstatfs`: an empty file system of so many blocks. On 64-bit machines the fields of the kernel's structure are
 /// 64-bit integers in this order; the last four are unused.
-const fn file_system(blocks: u64) -> [u64; 15] {
+const fn statfs_fields(blocks: u64) -> [u64; 15] {
     let (size, free, available) = (blocks, blocks, blocks);
     let (files, free_files) = (FREE_FILES, FREE_FILES);
     let id = 0;
@@ -241,7 +242,7 @@ const fn file_system(blocks: u64) -> [u64; 15] {
 
 /// The answer of `sysinfo`: the host's figures before the first agent started, and the agent's memory. On 64-bit machines that put the lower
 /// byte first, the fields of the kernel's structure and their padding are these integers.
-fn system(memory: MemoryView) -> [u64; 14] {
+fn sysinfo_fields(memory: MemoryView) -> [u64; 14] {
     static HOST: OnceLock<Sysinfo> = OnceLock::new();
     let host = HOST.get_or_init(sysinfo);
     let unit = u64::from(host.mem_unit).max(1);
@@ -289,7 +290,7 @@ enum Reply {
     Failed(Errno),
     /// The kernel executes it.
     Execute,
-    /// Later.
+    /// It is answered later, when the lock that it waits for is free.
     Waits,
 }
 
@@ -305,14 +306,14 @@ impl From<LockOutcome> for Reply {
 }
 
 /// Answers the calls of one agent.
-struct Answerer<'a> {
+struct CallHandler<'a> {
     listener: &'a OwnedFd,
-    answers: Answers,
+    values: EmulatedValues,
     sessions: SessionBudget,
     locks: FileLocks,
 }
 
-impl Answerer<'_> {
+impl CallHandler<'_> {
     /// Answers until the last process with the filter has ended.
     fn answer_calls(&mut self) {
         let mut last_answer = Duration::ZERO;
@@ -328,15 +329,15 @@ impl Answerer<'_> {
             if !is_asked && !events.is_empty() {
                 return;
             }
-            let begin = own_cpu_time();
-            if begin > QUICK_ANSWERS {
+            let cpu_time_before = own_cpu_time();
+            if cpu_time_before > UNTHROTTLED_CPU_TIME {
                 std::thread::sleep(PAUSE.max(last_answer * PAUSE_PER_CPU_TIME));
             }
             self.retry_locks();
             if is_asked && !self.answer_next() {
                 return;
             }
-            last_answer = own_cpu_time().saturating_sub(begin);
+            last_answer = own_cpu_time().saturating_sub(cpu_time_before);
         }
     }
 
@@ -405,9 +406,9 @@ impl Answerer<'_> {
         let int = |argument: u64| argument as i32;
         match i64::from(call.data.nr) {
             libc::SYS_statfs | libc::SYS_fstatfs => {
-                write_figures(caller, second, &self.answers.file_system)
+                write_figures(caller, second, &self.values.statfs_fields)
             }
-            libc::SYS_sysinfo => write_figures(caller, first, &self.answers.system),
+            libc::SYS_sysinfo => write_figures(caller, first, &self.values.sysinfo_fields),
             libc::SYS_setsid if self.sessions.take(Instant::now()) => Ok(Reply::Execute),
             libc::SYS_setsid => Ok(Reply::Failed(Errno::PERM)),
             libc::SYS_socket if int(first) == libc::AF_NETLINK => {
@@ -419,8 +420,8 @@ impl Answerer<'_> {
                 })
             }
             // Without namespaces the network is the host's, and only local sockets are allowed.
-            libc::SYS_connect if !self.answers.has_namespaces => Ok(Reply::Execute),
-            libc::SYS_socket | libc::SYS_connect => Ok(match caller.sockets() {
+            libc::SYS_connect if !self.values.has_namespaces => Ok(Reply::Execute),
+            libc::SYS_socket | libc::SYS_connect => Ok(match caller.socket_count() {
                 Ok(sockets) if sockets < MAX_SOCKETS => Reply::Execute,
                 Ok(_) => Reply::Failed(Errno::NFILE),
                 Err(error) => {
@@ -429,7 +430,7 @@ impl Answerer<'_> {
                 }
             }),
             libc::SYS_flock => {
-                let has_own_files = self.answers.has_namespaces;
+                let has_own_files = self.values.has_namespaces;
                 let outcome = self
                     .locks
                     .lock(caller, int(first), int(second), has_own_files)?;
@@ -452,7 +453,7 @@ impl Answerer<'_> {
             return Ok(Reply::Failed(Errno::SRCH));
         };
         let mask = self
-            .answers
+            .values
             .cpus
             .agent_mask(&sched_getaffinity(Some(thread))?);
         if !bytes.is_multiple_of(8) || bytes < mask.len() as u64 {
@@ -475,7 +476,7 @@ impl Answerer<'_> {
         let mut mask = [0; MAX_MASK_BYTES];
         let read = &mut mask[..MAX_MASK_BYTES.min(bytes as usize)];
         caller.read(address, read)?;
-        let set = self.answers.cpus.host_set(read);
+        let set = self.values.cpus.host_set(read);
         if set.count() == 0 {
             return Ok(Reply::Failed(Errno::INVAL));
         }

@@ -162,7 +162,7 @@ impl Bubblewrap {
             line.read_only(&spec.runtime.source(&path), &path)?;
         }
         line.args(["--proc", "/proc", "--dev", "/dev"]);
-        line.hide_counters();
+        line.hide_host_files();
         let cpus = CpuView::new(spec);
         let memory = MemoryView::new(spec);
         line.show_counter_snapshots(&cpus, &memory)?;
@@ -279,9 +279,9 @@ impl CommandLine {
     }
 
     /// Covers files that show the whole host or other agents, and that no agent needs.
-    fn hide_counters(&mut self) {
-        // A module of the kernel may have been loaded or unloaded since the last start.
-        let Hidden { folders, files } = Hidden::in_proc();
+    fn hide_host_files(&mut self) {
+        // Listed at each start: a kernel module that was loaded or unloaded since the last one changes the entries.
+        let HiddenProcEntries { folders, files } = HiddenProcEntries::list();
         let folders = folders.iter().map(String::as_str).chain([TERMINALS]);
         for folder in folders {
             let cover = ["--perms", "0555", "--size", "4096", "--tmpfs", folder];
@@ -401,14 +401,14 @@ fn check_mount_points(root: &Path) -> Result<(), SandboxError> {
 }
 
 /// The entries of `/proc` that agents must not see.
-struct Hidden {
+struct HiddenProcEntries {
     folders: Vec<String>,
     files: Vec<String>,
 }
 
-impl Hidden {
+impl HiddenProcEntries {
     /// All but the visible ones and those of processes, which have numbers as names.
-    fn in_proc() -> Self {
+    fn list() -> Self {
         let (mut folders, mut files) = (Vec::new(), Vec::new());
         for entry in fs::read_dir("/proc").into_iter().flatten().flatten() {
             let Ok(name) = entry.file_name().into_string() else {

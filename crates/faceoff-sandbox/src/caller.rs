@@ -76,14 +76,14 @@ impl Caller<'_> {
     }
 
     /// The number of the file system of a folder, as the agent sees it.
-    pub(crate) fn file_system(self, folder: &str) -> io::Result<u64> {
+    pub(crate) fn device_of_folder(self, folder: &str) -> io::Result<u64> {
         let found = fs::metadata(self.path("root").join(folder.trim_start_matches('/')))?;
         check_waiting(self.listener, self.id)?;
         Ok(found.dev())
     }
 
     /// The number of open sockets in the agent's network.
-    pub(crate) fn sockets(self) -> io::Result<i32> {
+    pub(crate) fn socket_count(self) -> io::Result<i32> {
         let text = fs::read_to_string(self.path("net/sockstat"))?;
         check_waiting(self.listener, self.id)?;
         number_after(&text, "sockets: used").ok_or_else(|| io::ErrorKind::InvalidData.into())

@@ -1,7 +1,7 @@
 //! Set-up of the child process between fork and exec: cgroup, CPUs, mounts, limits, user and filters.
 
 use crate::{
-    Limits, agent_user::AgentUser, answered_calls::AnsweredCalls, private_mounts::PrivateMounts,
+    Limits, agent_user::AgentUser, answered_calls::CallFilter, private_mounts::PrivateMounts,
     private_network::PrivateNetwork, protocol_descriptors::ProtocolDescriptors, seccomp::Filters,
 };
 use rustix::{
@@ -36,7 +36,7 @@ pub(crate) struct ChildSetup {
     /// File descriptors that stay open after the exec.
     pub inherited_fds: Vec<OwnedFd>,
     /// The filter of the calls that the service answers.
-    pub answered_calls: Option<AnsweredCalls>,
+    pub call_filter: Option<CallFilter>,
     /// Filters that the child installs itself; used without bubblewrap.
     pub filters: Option<Filters>,
     /// Files that the agent makes have the usual modes, whatever the service's umask.
@@ -196,8 +196,8 @@ impl ChildSetup {
         if process::getppid() != Some(parent) {
             return Err((Step::DieWithParent, Errno::SRCH));
         }
-        if let Some(calls) = &self.answered_calls {
-            calls
+        if let Some(filter) = &self.call_filter {
+            filter
                 .install()
                 .map_err(|error| (Step::AnswerCalls, error))?;
         }

@@ -10,7 +10,7 @@ mod estimator;
 mod reading;
 
 use crate::{
-    CallerCounters, cpu_clock,
+    EvaluatorCounters, cpu_clock,
     cpu_counters::{parse_throttled, parse_ticks, parse_usage, read_text, sum_of_cpus},
     thread_waits::{AnswerState, TrackedThreads, WaitLedger},
 };
@@ -32,8 +32,8 @@ pub struct Baseline {
     /// Counters of the agent's CPUs, without the states of its threads. `None` without a cgroup, or if the kernel
     /// counts in ticks only.
     pub cpus: Option<CpuReading>,
-    /// Counters of the calling thread, if requested.
-    pub caller: Option<CallerCounters>,
+    /// Counters of the calling thread (the evaluator's), if requested.
+    pub evaluator: Option<EvaluatorCounters>,
 }
 
 /// The open counter files of one agent.

@@ -91,7 +91,7 @@ mod tests {
     use crate::affinity::cpu_set;
 
     #[test]
-    fn agents_numbers_start_at_0() {
+    fn agents_cpu_numbers_start_at_0() {
         let numbers = CpuNumbers::of(&[11, 3, 3], true);
         assert!(numbers.is_renumbered());
         assert_eq!(numbers.all(), [0, 1]);
@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_stay_where_they_start_at_0_or_no_call_is_answered() {
+    fn cpu_numbers_stay_if_they_start_at_0_or_without_filter() {
         assert!(!CpuNumbers::of(&[0, 1], true).is_renumbered());
         let unfiltered = CpuNumbers::of(&[70], false);
         assert!(!unfiltered.is_renumbered());

@@ -69,19 +69,19 @@ impl FileLocks {
         let devices: Vec<_> = OWN_FOLDERS
             .iter()
             .filter(|_| has_own_files)
-            .filter_map(|folder| caller.file_system(folder).ok())
+            .filter_map(|folder| caller.device_of_folder(folder).ok())
             .collect();
         // Looked at before it is fetched: if the agent closes a socket or a pipe meanwhile, its end here could take long.
         if !caller.is_file_on(number, &devices)? {
-            return Ok(of_shared_file(operation));
+            return Ok(shared_file_outcome(operation));
         }
         let file = caller.file(number)?;
         if !devices.contains(&fstat(&file)?.st_dev) {
-            return Ok(of_shared_file(operation));
+            return Ok(shared_file_outcome(operation));
         }
         match flock(&file, operation) {
             Ok(()) => Ok(LockOutcome::Locked(file)),
-            Err(Errno::WOULDBLOCK) if may_wait && !self.has_place(caller.listener) => {
+            Err(Errno::WOULDBLOCK) if may_wait && !self.has_capacity(caller.listener) => {
                 Ok(LockOutcome::Failed(Errno::NOLCK))
             }
             Err(Errno::WOULDBLOCK) if may_wait => {
@@ -99,7 +99,7 @@ impl FileLocks {
     }
 
     /// May another thread wait? Those that were killed meanwhile are forgotten.
-    fn has_place(&mut self, listener: BorrowedFd<'_>) -> bool {
+    fn has_capacity(&mut self, listener: BorrowedFd<'_>) -> bool {
         if self.waiting.len() >= MAX_WAITING {
             self.waiting
                 .retain(|lock| check_waiting(listener, lock.call).is_ok());
@@ -143,7 +143,7 @@ impl FileLocks {
 }
 
 /// No process can write to a shared file, so a shared lock excludes none; it succeeds without effect.
-fn of_shared_file(operation: FlockOperation) -> LockOutcome {
+fn shared_file_outcome(operation: FlockOperation) -> LockOutcome {
     match operation {
         FlockOperation::NonBlockingLockExclusive => LockOutcome::Failed(Errno::NOSYS),
         _ => LockOutcome::Done,

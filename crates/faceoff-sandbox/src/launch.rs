@@ -4,7 +4,7 @@ use crate::{
     Isolation, Layer, SandboxError, SpawnError, SpawnSpec,
     affinity::cpu_set,
     agent_user::AgentUser,
-    answered_calls::{AnsweredCalls, CallAnswerer},
+    answered_calls::{CallFilter, CallHandlerSetup},
     bubblewrap::{Bubblewrap, environment},
     cgroup::AgentCgroup,
     channel::Channel,
@@ -46,7 +46,7 @@ pub(crate) struct Launch {
     command: Command,
     setup: ChildSetup,
     /// Answers some of the agent's system calls.
-    answerer: Option<CallAnswerer>,
+    call_handler: Option<CallHandlerSetup>,
     channel: Channel,
     status: Option<StatusPipe>,
     cgroup: Option<AgentCgroup>,
@@ -75,11 +75,11 @@ impl Launch {
         let channel = Channel::new()?;
         let cgroup = AgentCgroup::create(&spec.limits, &spec.isolation, &spec.cpus)?;
         let is_confined = cgroup.as_ref().is_some_and(|cgroup| cgroup.confines_cpus);
-        let (filters, answered_calls, answerer) = if enforces(Layer::Seccomp) {
-            let (calls, answerer) = AnsweredCalls::new(spec)?;
+        let (filters, call_filter, call_handler) = if enforces(Layer::Seccomp) {
+            let (filter, call_handler) = CallFilter::new(spec)?;
             let has_own_network = enforces(Layer::Namespaces);
             let filters = Filters::build(has_own_network, !spec.cpus.is_empty() && !is_confined)?;
-            (Some(filters), Some(calls), Some(answerer))
+            (Some(filters), Some(filter), Some(call_handler))
         } else {
             (None, None, None)
         };
@@ -96,7 +96,7 @@ impl Launch {
                 Vec::new()
             },
             user,
-            answered_calls,
+            call_filter,
             has_usual_umask: true,
             raise_oom_score: true,
             ..ChildSetup::default()
@@ -112,7 +112,7 @@ impl Launch {
             return Ok(Self {
                 command,
                 setup,
-                answerer,
+                call_handler,
                 channel,
                 status: Some(status),
                 cgroup,
@@ -131,7 +131,7 @@ impl Launch {
         Ok(Self {
             command,
             setup,
-            answerer,
+            call_handler,
             channel,
             status: None,
             cgroup,
@@ -150,7 +150,7 @@ impl Launch {
         Ok(Self {
             command,
             setup,
-            answerer: None,
+            call_handler: None,
             channel: Channel::new()?,
             status: None,
             cgroup: None,
@@ -163,7 +163,7 @@ impl Launch {
         let Self {
             mut command,
             mut setup,
-            answerer,
+            call_handler,
             channel,
             status,
             cgroup,
@@ -194,8 +194,8 @@ impl Launch {
         };
         const WATCH_ACTION: &str = "cannot watch the agent";
         let mut tree = ProcessTree::new(child, status, cgroup, scratch).context(WATCH_ACTION)?;
-        if let Some(answerer) = answerer {
-            tree.answer_thread = Some(answerer.start()?);
+        if let Some(call_handler) = call_handler {
+            tree.call_handler_thread = Some(call_handler.start()?);
         }
         let mut stderr =
             StderrLog::drain(log, spec.limits.stderr_tail_bytes).context(WATCH_ACTION)?;

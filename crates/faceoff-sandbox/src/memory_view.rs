@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn memory_without_a_limit_below_the_hosts_is_the_hosts() {
+    fn host_memory_is_shown_without_a_lower_limit() {
         assert_eq!(shown(None).as_bytes(), HOST);
         assert_eq!(shown(Some(1 << 40)).as_bytes(), HOST);
     }

@@ -47,8 +47,8 @@ const DEVICES: [(&CStr, &CStr, u32, u32); 6] = [
 #[derive(Debug)]
 pub(crate) struct PrivateMounts {
     sources: Vec<Source>,
-    /// May this service make files of devices?
-    makes_devices: bool,
+    /// May this service make device nodes?
+    can_make_device_nodes: bool,
 }
 
 #[derive(Debug)]
@@ -65,8 +65,8 @@ impl PrivateMounts {
     pub(crate) fn new() -> Self {
         Self {
             sources: Vec::new(),
-            // The root of a container's user namespace may not.
-            makes_devices: AgentUser::is_host_root(),
+            // The root user of a container's user namespace may not make device nodes.
+            can_make_device_nodes: AgentUser::is_host_root(),
         }
     }
 
@@ -147,7 +147,7 @@ impl PrivateMounts {
             MountFlags::NOSUID,
             c"mode=0755,size=64k",
         )?;
-        if self.makes_devices {
+        if self.can_make_device_nodes {
             make_devices()?;
         }
         for source in &mut self.sources {
@@ -175,7 +175,7 @@ impl PrivateMounts {
     }
 }
 
-/// Makes files of devices and mounts them over the host's, from which bubblewrap takes them.
+/// Makes device nodes and mounts them over the host's, from which bubblewrap takes them.
 fn make_devices() -> Result<(), Errno> {
     let everyone = Mode::from_raw_mode(0o666);
     for (device, file, major, minor) in DEVICES {

@@ -1,7 +1,7 @@
 //! A running agent: questions and answers, measurements of its CPUs, and its end.
 
 use crate::{
-    AnswerState, Baseline, CallerCounters, CpuReading, CpuSamples, HostInterference, Isolation,
+    AnswerState, Baseline, CpuReading, CpuSamples, EvaluatorCounters, HostInterference, Isolation,
     Killer, Limits, ReadLine, SandboxError, SpawnError, SpawnSpec, WriteError,
     cgroup::AgentCgroup,
     command_check::check_command,
@@ -290,12 +290,12 @@ impl AgentProcess {
         accounting.read_start(&self.threads)
     }
 
-    /// Reads the counters before a question. `caller_cpus`: the CPUs of the calling thread if they are disjoint from
+    /// Reads the counters before a question. `evaluator_cpus`: the CPUs of the calling thread (the evaluator's) if they are disjoint from
     /// the agent's; then its counters are included.
-    pub fn read_baseline(&self, caller_cpus: Option<&[usize]>) -> Baseline {
+    pub fn read_baseline(&self, evaluator_cpus: Option<&[usize]>) -> Baseline {
         let cgroup = self.tree.cgroup.as_ref();
         let accounting = cgroup.and_then(|cgroup| cgroup.cpu_accounting.as_ref());
-        let stat = if accounting.is_some() || caller_cpus.is_some() {
+        let stat = if accounting.is_some() || evaluator_cpus.is_some() {
             fs::read_to_string("/proc/stat").unwrap_or_default()
         } else {
             String::new()
@@ -303,15 +303,15 @@ impl AgentProcess {
         Baseline {
             read_at: Instant::now(),
             cpus: accounting.and_then(|accounting| accounting.read_baseline(&self.threads, &stat)),
-            caller: caller_cpus
-                .map(|cpus| CallerCounters::read(&stat, cpus, self.stderr.reader_run_time())),
+            evaluator: evaluator_cpus
+                .map(|cpus| EvaluatorCounters::read(&stat, cpus, self.stderr.reader_run_time())),
         }
     }
 
     /// The counters of the calling thread, which may use `cpus`, after [`Self::read_baseline`].
-    pub fn caller_counters(&self, cpus: &[usize]) -> CallerCounters {
+    pub fn evaluator_counters(&self, cpus: &[usize]) -> EvaluatorCounters {
         let stat = fs::read_to_string("/proc/stat").unwrap_or_default();
-        CallerCounters::read(&stat, cpus, self.stderr.reader_run_time())
+        EvaluatorCounters::read(&stat, cpus, self.stderr.reader_run_time())
     }
 
     /// Host interference since the question: the time in which the agent was runnable and could not run, because all

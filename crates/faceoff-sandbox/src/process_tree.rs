@@ -1,7 +1,7 @@
 //! The process tree of one agent: waiting for its end, killing and cleaning up.
 
 use crate::{
-    Killer, answered_calls::AnswerThread, cgroup::AgentCgroup, cpu_clock::TreeClock,
+    Killer, answered_calls::CallHandlerThread, cgroup::AgentCgroup, cpu_clock::TreeClock,
     line_socket::wait_for, status_pipe::StatusPipe,
 };
 use rustix::{
@@ -38,7 +38,7 @@ pub(crate) struct ProcessTree {
     pub(crate) status: Option<StatusPipe>,
     pub(crate) cgroup: Option<AgentCgroup>,
     /// Answers some system calls of the tree.
-    pub(crate) answer_thread: Option<AnswerThread>,
+    pub(crate) call_handler_thread: Option<CallHandlerThread>,
     /// The scratch folder on the host, for agents without a mount namespace.
     scratch: Option<tempfile::TempDir>,
     /// Set when the child has been reaped.
@@ -61,7 +61,7 @@ impl ProcessTree {
                 init_pid: None,
                 status,
                 cgroup,
-                answer_thread: None,
+                call_handler_thread: None,
                 scratch,
                 exit_status: None,
             }),
@@ -229,7 +229,7 @@ impl ProcessTree {
         if let Some(mut cgroup) = self.cgroup.take() {
             cgroup.remove();
         }
-        if let Some(thread) = self.answer_thread.take() {
+        if let Some(thread) = self.call_handler_thread.take() {
             thread.join(Instant::now() + ANSWER_THREAD_TIMEOUT);
         }
         if let Some(scratch) = self.scratch.take()

@@ -6,7 +6,7 @@ use crate::{
     session,
 };
 use axum::http::{HeaderMap, HeaderValue, header, request::Parts};
-use faceoff_api::{pasted::secret_in, token::hash_token};
+use faceoff_api::{secret_extraction::extract_secret, token::hash_token};
 
 /// The credential of a request: an API token, or the secret of a browser's session.
 pub(crate) enum Credential<'a> {
@@ -60,8 +60,8 @@ pub fn sealed_grant(headers: &HeaderMap) -> Option<&str> {
 fn bearer_token(value: &HeaderValue) -> Option<&str> {
     let text = value.to_str().ok()?.trim();
     let token = match text.split_once(' ') {
-        Some((scheme, token)) if scheme.eq_ignore_ascii_case("bearer") => secret_in(token),
-        None if secret_in(text).starts_with("fo_") => secret_in(text),
+        Some((scheme, token)) if scheme.eq_ignore_ascii_case("bearer") => extract_secret(token),
+        None if extract_secret(text).starts_with("fo_") => extract_secret(text),
         _ => return None,
     };
     (!token.is_empty()).then_some(token)

@@ -103,7 +103,7 @@ pub struct ViolationInfo {
     /// The heading of its columns in a terminal, of at most four letters.
     pub short: String,
     /// What has happened, such as "end effector out of bounds".
-    pub breach: String,
+    pub description: String,
     /// What its size is in files, such as "metres beyond the bound".
     pub measure: String,
     /// The least and the most penalty points for it in one episode: multiples of one half. Only those of the computation time differ.

@@ -106,9 +106,11 @@ pub struct TimeLimits {
     pub bye_s: f64,
     /// Maximum number of repetitions of an episode because of host interference; then the last try counts.
     /// 0: never repeated.
-    pub host_noise_reruns: u32,
+    #[serde(rename = "host_noise_reruns")]
+    pub host_interference_reruns: u32,
     /// Maximum number of such repetitions per 100 episodes; for other numbers in proportion, rounded up.
-    pub host_noise_reruns_per_100: u32,
+    #[serde(rename = "host_noise_reruns_per_100")]
+    pub host_interference_reruns_per_100: u32,
 }
 
 impl Default for TimeLimits {
@@ -123,8 +125,8 @@ impl Default for TimeLimits {
             reset_mean_s: 0.2,
             resets_extra_s: 30.0,
             bye_s: 5.0,
-            host_noise_reruns: 2,
-            host_noise_reruns_per_100: 5,
+            host_interference_reruns: 2,
+            host_interference_reruns_per_100: 5,
         }
     }
 }
@@ -155,9 +157,9 @@ impl TimeLimits {
 
     /// Allowed repetitions because of host interference in a run of `episodes` episodes.
     #[must_use]
-    pub fn max_host_noise_reruns(&self, episodes: u32) -> u32 {
+    pub fn max_host_interference_reruns(&self, episodes: u32) -> u32 {
         let reruns =
-            (u64::from(episodes) * u64::from(self.host_noise_reruns_per_100)).div_ceil(100);
+            (u64::from(episodes) * u64::from(self.host_interference_reruns_per_100)).div_ceil(100);
         u32::try_from(reruns).unwrap_or(u32::MAX)
     }
 

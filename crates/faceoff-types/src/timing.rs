@@ -38,9 +38,11 @@ pub struct SlotTiming {
     /// Round trips between the episodes, in seconds.
     pub during_s: RoundTrips,
     /// Longest delay of one answer by host interference, in seconds; 0 if there was none.
-    pub longest_stall_s: f64,
+    #[serde(rename = "longest_stall_s")]
+    pub max_host_interference_s: f64,
     /// Number of times that an episode was discarded and repeated because of host interference.
-    pub host_noise_reruns: u32,
+    #[serde(rename = "host_noise_reruns")]
+    pub host_interference_reruns: u32,
     /// Number of times that a shard was restarted from its first episode because of a platform fault; absent
     /// if 0.
     #[serde(default, skip_serializing_if = "is_zero")]
@@ -58,10 +60,12 @@ impl SlotTiming {
         Self {
             before_s: self.before_s.worse(other.before_s),
             during_s: self.during_s.worse(other.during_s),
-            longest_stall_s: self.longest_stall_s.max(other.longest_stall_s),
-            host_noise_reruns: self
-                .host_noise_reruns
-                .saturating_add(other.host_noise_reruns),
+            max_host_interference_s: self
+                .max_host_interference_s
+                .max(other.max_host_interference_s),
+            host_interference_reruns: self
+                .host_interference_reruns
+                .saturating_add(other.host_interference_reruns),
             platform_retries: self.platform_retries.saturating_add(other.platform_retries),
         }
     }
@@ -79,13 +83,14 @@ mod tests {
             p99: max,
             max,
         };
-        let slot = |before_s, during_s, longest_stall_s, host_noise_reruns| SlotTiming {
-            before_s,
-            during_s,
-            longest_stall_s,
-            host_noise_reruns,
-            platform_retries: 2 * host_noise_reruns,
-        };
+        let slot =
+            |before_s, during_s, max_host_interference_s, host_interference_reruns| SlotTiming {
+                before_s,
+                during_s,
+                max_host_interference_s,
+                host_interference_reruns,
+                platform_retries: 2 * host_interference_reruns,
+            };
         let worse = slot(round_trips(1.0, 9.0), round_trips(4.0, 5.0), 0.1, 1).worse(slot(
             round_trips(2.0, 3.0),
             round_trips(1.0, 8.0),

@@ -4,7 +4,7 @@ use baseline::Baseline;
 use faceoff_sim::AirHockeyProfile;
 use striker::Agent as Striker;
 
-use crate::support::game::{Player, Tally, new_game, play};
+use crate::support::game::{Player, ROBOT_1, ROBOT_2, Tally, new_game, play};
 
 /// Two minutes, in control steps.
 const STEPS: u32 = 6000;
@@ -21,12 +21,12 @@ fn play_game(seed: u64, mut players: [Player; 2]) -> Tally {
 fn striker_beats_baseline_from_either_side() {
     let striker = |robot_index| Player::agent(Striker::new, robot_index);
     let baseline = |robot_index| Player::agent(Baseline::new, robot_index);
-    let striker_first = play_game(2, [striker(0), baseline(1)]);
+    let striker_first = play_game(2, [striker(ROBOT_1), baseline(ROBOT_2)]);
     assert!(
         striker_first.score[0] > striker_first.score[1],
         "{striker_first:?}"
     );
-    let striker_second = play_game(4, [baseline(0), striker(1)]);
+    let striker_second = play_game(4, [baseline(ROBOT_1), striker(ROBOT_2)]);
     assert!(
         striker_second.score[1] > striker_second.score[0],
         "{striker_second:?}"
@@ -35,8 +35,7 @@ fn striker_beats_baseline_from_either_side() {
 
 #[test]
 fn baseline_beats_hold_and_stays_deployable() {
-    let robot_index = 0;
-    let baseline = Player::agent(Baseline::new, robot_index);
+    let baseline = Player::agent(Baseline::new, ROBOT_1);
     let tally = play_game(2023, [baseline, Player::hold()]);
     assert!(tally.score[0] > tally.score[1], "{tally:?}");
     assert!(tally.goals[0] >= 1, "{tally:?}");

@@ -45,15 +45,15 @@ struct Interception {
 pub struct Absorb {
     interception: Option<Interception>,
     /// Minimum |y| of the puck at interception, metres: nearer to the table's long axis is too late.
-    min_middle_distance: f64,
+    min_axis_distance: f64,
 }
 
 impl Absorb {
-    /// No plan yet. Contacts with a puck at a smaller |y| than `min_middle_distance` are too late.
-    pub fn new(min_middle_distance: f64) -> Self {
+    /// No plan yet. Contacts with a puck at a smaller |y| than `min_axis_distance` are too late.
+    pub fn new(min_axis_distance: f64) -> Self {
         Self {
             interception: None,
-            min_middle_distance,
+            min_axis_distance,
         }
     }
 
@@ -120,7 +120,7 @@ impl Absorb {
         let clearance = scene.field.contact_distance() + 0.012;
         let possible = |time_left: f64| {
             let (plan, puck) = plan_interception(scene, time_left)?;
-            let early_enough = puck.pos.y.abs() > self.min_middle_distance;
+            let early_enough = puck.pos.y.abs() > self.min_axis_distance;
             let next_point = waypoint(scene, plan.mallet, clearance);
             let detour = if next_point == plan.mallet { 0.0 } else { 0.4 };
             let needed = Target::stop(&scene.mallet, next_point, Pace::QUICK).time + detour;

@@ -25,8 +25,8 @@ const PUCK_TOLERANCE: f64 = 0.03;
 /// Contact normals (directions from mallet to puck) evaluated per control step.
 const NORMALS_PER_STEP: usize = 2;
 
-/// A puck closer to the middle than this |y| is not stopped, because crossing the middle ends the episode, metres.
-const MIN_MIDDLE_DISTANCE: f64 = 0.05;
+/// A puck closer to the table's long axis than this |y| is not stopped, because crossing the axis ends the episode, metres.
+const MIN_AXIS_DISTANCE: f64 = 0.05;
 /// Time of the retreat after a strike, seconds: the puck's motion becomes known.
 const RETREAT_TIME: f64 = 0.25;
 
@@ -59,7 +59,7 @@ impl Prepare {
                 next_normal: 0,
                 best: None,
             },
-            absorb: Absorb::new(MIN_MIDDLE_DISTANCE),
+            absorb: Absorb::new(MIN_AXIS_DISTANCE),
         }
     }
 
@@ -96,7 +96,8 @@ impl Prepare {
         mut best: Option<Strike>,
     ) -> MalletCommand {
         let puck = &scene.puck;
-        let moving = puck.vel.norm() > CALM_PUCK_SPEED || scene.puck_speed_deviation.norm() > 0.05;
+        let moving =
+            puck.vel.norm() > CALM_PUCK_SPEED || scene.puck_velocity_deviation.norm() > 0.05;
         if moving || is_prepared(puck) {
             self.phase = Phase::Search {
                 next_normal: 0,
@@ -213,7 +214,7 @@ impl Prepare {
     }
 }
 
-/// Moves away from the puck: to a point in front of the goal, on the other side of the middle in y.
+/// Moves away from the puck: to a point in front of the goal, on the other side of the long axis.
 fn retreat(scene: &Scene<'_>) -> MalletCommand {
     let y = if scene.puck.pos.y > 0.0 { -0.12 } else { 0.12 };
     let pos = Vec2::new(-0.8, y);

@@ -3,7 +3,7 @@
 use faceoff_sim::AirHockeyProfile;
 use striker::Agent;
 
-use crate::support::game::{Player, Tally, new_game, play};
+use crate::support::game::{Player, ROBOT_1, ROBOT_2, Tally, new_game, play};
 
 /// Two and a half minutes, in control steps.
 const STEPS: u32 = 7500;
@@ -21,7 +21,7 @@ fn play_game(profile: AirHockeyProfile, seed: u64, mut players: [Player; 2]) -> 
 
 #[test]
 fn striker_beats_hold_from_either_side() {
-    for robot_index in [0, 1] {
+    for robot_index in [ROBOT_1, ROBOT_2] {
         let mut players = [Player::hold(), Player::hold()];
         players[robot_index] = Player::agent(Agent::new, robot_index);
         let tally = play_game(AirHockeyProfile::Evaluation, 2, players);
@@ -37,7 +37,10 @@ fn striker_beats_hold_from_either_side() {
 
 #[test]
 fn two_strikers_commit_no_fouls_and_stay_deployable() {
-    let players = [Player::agent(Agent::new, 0), Player::agent(Agent::new, 1)];
+    let players = [
+        Player::agent(Agent::new, ROBOT_1),
+        Player::agent(Agent::new, ROBOT_2),
+    ];
     let tally = play_game(AirHockeyProfile::Evaluation, 2, players);
     assert_eq!(tally.fouls, [0, 0], "{tally:?}");
     assert!(
@@ -53,7 +56,10 @@ fn two_strikers_commit_no_fouls_and_stay_deployable() {
 fn game_is_reproducible() {
     let run = || {
         let mut game = new_game(AirHockeyProfile::Evaluation, 7);
-        let mut players = [Player::agent(Agent::new, 0), Player::agent(Agent::new, 1)];
+        let mut players = [
+            Player::agent(Agent::new, ROBOT_1),
+            Player::agent(Agent::new, ROBOT_2),
+        ];
         let tally = play(&mut game, &mut players, 1000, |_, _, _| {});
         (tally, game.world().puck().pose)
     };

@@ -7,6 +7,11 @@ use striker::{Env, Policy, Task};
 
 use super::env::env;
 
+/// Index of robot 1, in pairs the first.
+pub const ROBOT_1: usize = 0;
+/// Index of robot 2.
+pub const ROBOT_2: usize = 1;
+
 /// Control of a robot.
 pub enum Player {
     /// Keeps the first pose of a rally, as `agents/hold` does: 7 joint positions and 7 zero velocities; `None` before the first step.
@@ -21,7 +26,7 @@ impl Player {
         Self::Hold(None)
     }
 
-    /// An agent for the robot with index 0 or 1 (robot 1 or 2).
+    /// An agent for the robot with this index, [`ROBOT_1`] or [`ROBOT_2`].
     pub fn agent<P: Policy + 'static>(
         make_policy: impl Fn(Task, &Env) -> P,
         robot_index: usize,

@@ -254,7 +254,7 @@ fn fault_holds_the_arm_and_restarts_the_agent() {
 }
 
 #[test]
-fn too_many_faults_forfeit_and_both_sides_draw() {
+fn too_many_faults_forfeit_for_one_or_both_sides() {
     fn always_fault(_: u32, _: u32) -> ScriptedStep {
         ScriptedStep::Fault
     }

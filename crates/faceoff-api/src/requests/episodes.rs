@@ -1,6 +1,6 @@
 //! Filter of an evaluation's episodes, for the page that lists them: by task, outcome, violated limit and end.
 
-use faceoff_replay::EpisodeLine;
+use faceoff_replay::EpisodeIndexEntry;
 use faceoff_types::{EpisodeEnd, Task, ViolationName};
 use serde::{Deserialize, Serialize};
 
@@ -87,7 +87,7 @@ impl EpisodesQuery {
 
 impl EpisodeFilter {
     /// Whether the episode matches all conditions.
-    pub fn matches(self, episode: &EpisodeLine) -> bool {
+    pub fn matches(self, episode: &EpisodeIndexEntry) -> bool {
         let violates = |limit| match limit {
             ViolatedLimit::Any => !episode.violations.is_empty(),
             ViolatedLimit::One(name) => episode

@@ -35,9 +35,11 @@ pub enum AttemptOutcomeView {
     #[serde(rename = "broken")]
     PlatformFailed,
     /// The slot was shut down or lacked disk space. The attempt does not count towards the game's limit of attempts.
-    GivenBack,
+    #[serde(rename = "given_back")]
+    Released,
     /// The slot's process ended, or its lease expired.
     Lost,
     /// The game was cancelled while it was running.
-    CalledOff,
+    #[serde(rename = "called_off")]
+    Cancelled,
 }

@@ -1,7 +1,7 @@
 //! Episodes of an evaluation and their computation times. A *clip* is the recorded motion of an episode. Motion and outcome
 //! are public once the day is released. Observations, actions, computation times and faults need access to the dataset.
 
-use faceoff_replay::EpisodeLine;
+use faceoff_replay::EpisodeIndexEntry;
 use faceoff_types::Task;
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
@@ -11,7 +11,7 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct EpisodesView {
     /// One entry per episode.
-    pub episodes: Vec<EpisodeLine>,
+    pub episodes: Vec<EpisodeIndexEntry>,
     /// Histogram of computation times by task, shortest first; absent without access to the dataset.
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     pub computation_times: IndexMap<Task, Vec<TimeBinView>>,

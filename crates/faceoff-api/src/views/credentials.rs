@@ -9,7 +9,7 @@ use crate::views::{
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// What ended beside the token itself, or beside the user's own tokens and sessions; and which accounts stay.
+/// Credentials that ended together with a revoked token, or with a user's tokens and sessions; and the accounts that stay.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct EndedCredentialsView {
     /// Revoked tokens.
@@ -19,11 +19,12 @@ pub struct EndedCredentialsView {
     /// Disabled webhooks. They can be enabled again; check the address and rotate the secret before.
     pub webhooks: Vec<WebhookView>,
     /// Users who joined by these invitations, or by invitations of such users. Their accounts stay: close those that you do not know.
-    pub remaining_people: Vec<UserView>,
-    /// Users who got access again by a link of this user. Their accounts stay: unless it was they who asked for it, make a new link for
-    /// them (the role `return`), which ends everything else.
-    #[serde(default)]
-    pub restored_people: Vec<UserView>,
+    #[serde(rename = "remaining_people")]
+    pub remaining_users: Vec<UserView>,
+    /// Users who got access again by a link (an invitation with the role `return`) of this user. Their accounts stay. If such a user
+    /// did not ask for the link, make a new one: accepting it ends the credentials made before.
+    #[serde(rename = "restored_people", default)]
+    pub restored_users: Vec<UserView>,
 }
 
 impl EndedCredentialsView {
@@ -33,8 +34,8 @@ impl EndedCredentialsView {
         let tokens = self.tokens.iter();
         let invitations = self.invitations.iter();
         let webhooks = self.webhooks.iter();
-        let remaining = self.remaining_people.iter();
-        let restored = self.restored_people.iter();
+        let remaining = self.remaining_users.iter();
+        let restored = self.restored_users.iter();
         tokens
             .map(|token| format!("revoked: token {} ({})", token.name, token.id))
             .chain(invitations.map(|invitation| {
@@ -47,11 +48,12 @@ impl EndedCredentialsView {
                 )
             }))
             .chain(remaining.map(|user| {
-                format!("stays: the account of {}, who joined by such an invitation", user.name)
+                format!("stays: the account of {}, who joined by an invitation made with the ended credentials", user.name)
             }))
             .chain(restored.map(|user| {
                 format!(
-                    "stays: the account of {0}, who got access again by such a link; unless {0} asked for it, make a new link",
+                    "stays: the account of {0}, who got access again by a link made with the ended credentials; \
+                     unless {0} asked for that link, make a new one",
                     user.name
                 )
             }))
@@ -65,7 +67,7 @@ pub struct RevokedTokenView {
     /// The token.
     #[serde(flatten)]
     pub token: TokenView,
-    /// What was made with the token and ended with it; absent if there was nothing, or if you revoked your own token.
+    /// Credentials that were made with the token and ended with it; absent if there were none, or if you revoked your own token.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ended: Option<EndedCredentialsView>,
 }
@@ -76,7 +78,7 @@ pub struct ChangedAccessView {
     /// The user.
     #[serde(flatten)]
     pub user: UserView,
-    /// What the user had made and what ended, too; absent if there was nothing.
+    /// Credentials that the user had made and that ended, too; absent if there were none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ended: Option<EndedCredentialsView>,
 }
@@ -90,7 +92,7 @@ pub struct NewAccountView {
     /// The bearer token; the server stores only its hash.
     #[schema(example = "fo_person_…")]
     pub secret: String,
-    /// What a user who gets access again had made, and what ended now; absent if there was nothing.
+    /// Credentials that ended because the user got access again; absent if there were none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ended: Option<EndedCredentialsView>,
 }

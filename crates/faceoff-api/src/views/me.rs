@@ -37,7 +37,7 @@ pub struct TodayView {
     /// The evaluation day, a date in the stage's time zone.
     pub day: Date,
     /// The evaluation that counts. Null before the day's cutoff, and if the team had no active submission then. Also
-    /// null if it was cancelled, voided, not played in time or failed by a platform fault, and is not repeated.
+    /// null if it was cancelled or voided, missed its deadline or failed by a platform fault, and is not repeated.
     pub evaluation: Option<EvaluationId>,
     /// Its position in the queue; absent without an evaluation, and once it has ended.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -12,7 +12,7 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde::Serialize;
 use std::sync::Arc;
 
-/// Number of rows that a table of few episodes may have more than twice the expected ones, and still be read.
+/// A table is read if it has at most twice the expected number of rows, plus this number.
 const SURPLUS_ROWS: u64 = 1000;
 
 /// One row of `episodes.parquet`, without the states and hashes.
@@ -53,7 +53,7 @@ pub(crate) fn batches(
     let rows = groups
         .map(|group| group.num_rows().unsigned_abs())
         .fold(0, u64::saturating_add);
-    // Of a few rows too many or too few the caller says where.
+    // If only a few rows are missing or surplus, the caller reports which.
     if rows > expected_rows.saturating_mul(2).saturating_add(SURPLUS_ROWS) {
         return Err(DatasetError::Unreadable(format!(
             "{EPISODES_FILE} has {rows} rows, expected {expected_rows}"

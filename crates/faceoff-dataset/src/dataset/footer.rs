@@ -7,10 +7,10 @@ use parquet::{
     file::metadata::{ColumnChunkMetaData, ParquetMetaData},
 };
 
-/// Number of rows of a row group up to which it is read; this program writes some ten thousand.
+/// Maximum number of rows of a row group; this program writes about 33,000.
 const MAX_GROUP_ROWS: i64 = 1 << 24;
-/// Mean size of a value (a number, a short text or a list of up to a few hundred numbers) up to which a column is read, in bytes
-/// before compression.
+/// Maximum mean size of a column's values (numbers, short texts or lists of up to a few hundred numbers), in bytes before
+/// compression.
 const MAX_VALUE_BYTES: u64 = 4096;
 /// Size of a column of a row group that is always read: a few values may be longer.
 const SMALL_COLUMN_BYTES: u64 = 1 << 20;
@@ -21,8 +21,8 @@ pub(crate) fn check_table(table: &FileRange, footer: &ParquetMetaData) -> Result
     pages::check(table, footer)
 }
 
-/// Refuses negative numbers, columns that are not within the table, whose size is `table_bytes`, and columns that a small table
-/// states as far larger than such values are.
+/// Refuses negative numbers, columns outside of the table (of `table_bytes` bytes), and columns whose stated size is far too large
+/// for their number of rows.
 pub(super) fn check(footer: &ParquetMetaData, table_bytes: u64) -> Result<()> {
     // Columns that share bytes would make a small table as costly as a large one.
     let columns = footer.row_groups().iter().flat_map(|group| group.columns());

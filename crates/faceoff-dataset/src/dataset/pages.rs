@@ -14,9 +14,9 @@ use std::{collections::HashMap, ops::Range, sync::Arc};
 
 /// Bytes that are read for a page's header at first; a header with bounds of long texts is longer.
 const HEADER_BYTES: usize = 128;
-/// Length of a header up to which a page is read.
+/// Maximum length of a page's header.
 const MAX_HEADER_BYTES: usize = 1 << 20;
-/// Depth of nested structures up to which a header is read; the format has three.
+/// Maximum depth of nested structures in a header; the format has three.
 const MAX_DEPTH: usize = 8;
 
 /// Sizes of a page, in bytes.
@@ -29,7 +29,7 @@ struct PageSizes {
     compressed: u64,
 }
 
-/// Reads the headers of all pages. Refuses pages that together exceed what the footer states of their column. The columns must
+/// Reads the headers of all pages. Refuses pages that together exceed what the footer states for their column. The columns must
 /// lie within the table (`footer::check`).
 pub(super) fn check(table: &impl ChunkReader, footer: &ParquetMetaData) -> Result<()> {
     let mut columns = footer
@@ -90,16 +90,16 @@ fn read_header(table: &impl ChunkReader, range: Range<u64>) -> Result<PageSizes>
 }
 
 /// A table of which pages are read at the positions that its page index states. Refuses a page that states more bytes than the
-/// footer states of its column.
+/// footer states for its column.
 #[derive(Debug, Clone)]
 pub(super) struct IndexedPages<R> {
     table: R,
-    /// By position of a page: the bytes that the footer states of its column.
+    /// By position of a page: the bytes that the footer states for its column.
     max_bytes: Arc<HashMap<u64, u64>>,
 }
 
 impl<R: ChunkReader> IndexedPages<R> {
-    /// Checks the positions of the page index; where it has none of a column, checks the column's pages.
+    /// Checks the positions in the page index. Columns without a page index have all their pages checked.
     pub fn new(table: R, metadata: &ParquetMetaData, groups: &[usize]) -> Result<Self> {
         let mut max_bytes = HashMap::new();
         for group in groups {
@@ -180,7 +180,7 @@ impl<R: ChunkReader> ChunkReader for IndexedPages<R> {
             && !parse_header(&bytes).is_ok_and(|page| page.uncompressed <= *max_bytes)
         {
             return Err(ParquetError::General(format!(
-                "the page at byte {start} is invalid, or states more bytes than the footer states of its column, {max_bytes}"
+                "the page at byte {start} is invalid, or states more bytes than the footer states for its column, {max_bytes}"
             )));
         }
         Ok(bytes)

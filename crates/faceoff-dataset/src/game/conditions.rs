@@ -1,11 +1,11 @@
-//! The conditions of a game: the same to play under, and to verify the recording with.
+//! The conditions of a game, for playing it and for verifying its recording.
 
 use crate::simulator;
 use faceoff_airhockey::{SimulationSetup, simulation_setup};
 use faceoff_episode::{Conditions, InvalidConditions};
 use faceoff_wire::{dataset::SimulatorId, game::GameSpec};
 
-/// The world of a game.
+/// The simulation setup of a game.
 ///
 /// # Errors
 /// If the simulator has no such ruleset, profile or magnitudes.

@@ -116,9 +116,9 @@ impl GameReplay {
         let count = Columns(row).int("steps", 0).unwrap_or_default();
         let mut remaining = count as usize;
         while remaining > 0 {
-            let played = self.replay_steps(remaining, number, &recorded)?;
-            progress(played as u64);
-            remaining -= played;
+            let simulated_steps = self.replay_steps(remaining, number, &recorded)?;
+            progress(simulated_steps as u64);
+            remaining -= simulated_steps;
         }
         if self.game.is_in_rally() {
             let expected = "more: the rally has not ended";
@@ -127,16 +127,16 @@ impl GameReplay {
                 .into());
         }
         let rows = self.game.sink();
-        let played = batch(rows.rallies.take(), rows.rallies.schema());
-        check_same(location, row, &played)?;
+        let simulated = batch(rows.rallies.take(), rows.rallies.schema());
+        check_same(location, row, &simulated)?;
         for side in Side::BOTH {
             let rows = &mut rows.entries[side.index()];
-            let played = batch(rows.take(), rows.schema());
+            let simulated = batch(rows.take(), rows.schema());
             let file = entries_file(side);
             check_same(
                 RowLocation { file, ..location },
                 &recorded.entries[side.index()],
-                &played,
+                &simulated,
             )?;
         }
         Ok(())
@@ -203,17 +203,17 @@ impl GameReplay {
         let error = (0..count).find_map(|row| self.step(&sides, row, rally, recorded).err());
         // A difference before the error is reported first.
         let rows = self.game.sink();
-        let played = batch(rows.motion.take(), rows.motion.schema());
-        let mut compared = vec![(MOTION_FILE, &motion, played)];
+        let simulated = batch(rows.motion.take(), rows.motion.schema());
+        let mut compared = vec![(MOTION_FILE, &motion, simulated)];
         for side in Side::BOTH {
             let rows = &mut rows.sides[side.index()];
-            let played = batch(rows.take(), rows.schema());
-            compared.push((steps_file(side), &sides[side.index()], played));
+            let simulated = batch(rows.take(), rows.schema());
+            compared.push((steps_file(side), &sides[side.index()], simulated));
         }
         let earliest = compared
             .iter()
-            .filter_map(|(file, rows, played)| {
-                Some((file, compare::first_row_difference(rows, played)?))
+            .filter_map(|(file, rows, simulated)| {
+                Some((file, compare::first_row_difference(rows, simulated)?))
             })
             .min_by_key(|(_, cell)| cell.row);
         if let Some((file, cell)) = earliest {
@@ -285,9 +285,9 @@ fn batch(columns: Vec<ArrayRef>, schema: &SchemaRef) -> RecordBatch {
 fn check_same(
     location: RowLocation,
     recorded: &RecordBatch,
-    played: &RecordBatch,
+    simulated: &RecordBatch,
 ) -> Result<(), Difference> {
-    match compare::first_row_difference(recorded, played) {
+    match compare::first_row_difference(recorded, simulated) {
         None => Ok(()),
         Some(cell) => Err(location.difference(&cell.field, cell.recorded, cell.expected)),
     }

@@ -34,15 +34,15 @@ pub fn verify_game(
     progress: &dyn Fn(u64),
 ) -> Result<VerifiedGame, VerifyError> {
     check_reproducible(recording)?;
-    let played = GameReplay::open(recording)?.play(progress)?;
+    let simulated = GameReplay::open(recording)?.play(progress)?;
     let manifest = recording.manifest();
     let score = score_game(
         &game_settings(&manifest.spec, &manifest.agents),
-        &played.outcome,
-        &played.answer_times_s,
+        &simulated.outcome,
+        &simulated.answer_times_s,
     );
     for (name, expected) in [
-        (OUTCOME_FILE, json_file(&played.outcome)),
+        (OUTCOME_FILE, json_file(&simulated.outcome)),
         (RESULTS_FILE, json_file(&score)),
     ] {
         let expected = expected.map_err(DatasetError::unreadable(name))?;
@@ -52,8 +52,8 @@ pub fn verify_game(
         }
     }
     Ok(VerifiedGame {
-        rallies: played.outcome.rallies,
-        steps: played.outcome.steps,
+        rallies: simulated.outcome.rallies,
+        steps: simulated.outcome.steps,
         score,
     })
 }

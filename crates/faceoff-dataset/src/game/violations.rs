@@ -13,7 +13,7 @@ pub struct Violation {
     /// The first and the last sample.
     pub samples: [u32; 2],
     /// Largest excess over the limit: rad, rad/s or m.
-    pub worst: f64,
+    pub max_excess: f64,
 }
 
 impl Violation {
@@ -37,10 +37,10 @@ impl Violation {
                         let violation = current.get_or_insert(Self {
                             name: constraint.name(),
                             samples: [sample; 2],
-                            worst: value,
+                            max_excess: value,
                         });
                         violation.samples[1] = sample;
-                        violation.worst = violation.worst.max(value);
+                        violation.max_excess = violation.max_excess.max(value);
                     } else {
                         violations.extend(current.take());
                     }

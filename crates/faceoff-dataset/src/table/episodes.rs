@@ -34,7 +34,7 @@ pub(crate) struct EpisodeRows {
     faults: StringBuilder,
     actions_blake3: StringBuilder,
     times_blake3: StringBuilder,
-    host_noise_reruns: UInt32Builder,
+    host_interference_reruns: UInt32Builder,
     /// The true state before the first step.
     initial: FloatColumns,
     /// The observation after the last answered step.
@@ -106,7 +106,7 @@ impl EpisodeRows {
             faults: StringBuilder::new(),
             actions_blake3: StringBuilder::new(),
             times_blake3: StringBuilder::new(),
-            host_noise_reruns: UInt32Builder::new(),
+            host_interference_reruns: UInt32Builder::new(),
             initial,
             last,
         }
@@ -147,7 +147,7 @@ impl EpisodeRows {
     pub fn end(
         &mut self,
         outcome: &EpisodeOutcome,
-        host_noise_reruns: u32,
+        host_interference_reruns: u32,
     ) -> Result<(), RecordingError> {
         let started = self.started.take().ok_or_else(|| {
             RecordingError::Unusable("an episode ended without a start".to_owned())
@@ -180,7 +180,8 @@ impl EpisodeRows {
         let [actions, times] = self.digests.finish();
         self.actions_blake3.append_value(actions);
         self.times_blake3.append_value(times);
-        self.host_noise_reruns.append_value(host_noise_reruns);
+        self.host_interference_reruns
+            .append_value(host_interference_reruns);
         self.last.put(&self.last_observation);
         self.last.end_short_row();
         Ok(())
@@ -206,7 +207,7 @@ impl EpisodeRows {
         columns.push(Arc::new(self.faults.finish()));
         columns.push(Arc::new(self.actions_blake3.finish()));
         columns.push(Arc::new(self.times_blake3.finish()));
-        columns.push(Arc::new(self.host_noise_reruns.finish()));
+        columns.push(Arc::new(self.host_interference_reruns.finish()));
         columns.extend(self.initial.take());
         columns.extend(self.last.take());
         columns

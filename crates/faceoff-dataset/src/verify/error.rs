@@ -19,8 +19,8 @@ pub enum VerifyError {
     #[error("the job cannot be simulated: {0}")]
     Job(String),
     /// The threads could not be started.
-    #[error("starting the workers: {0}")]
-    Workers(#[from] rayon::ThreadPoolBuildError),
+    #[error("starting the threads: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
 }
 
 impl From<Difference> for VerifyError {

@@ -34,7 +34,7 @@ pub(super) struct ReplayedEpisode {
     /// Data of the episode's steps for scoring.
     pub steps: Measurements,
     /// How often the episode was played again because other programs disturbed the host.
-    pub host_noise_reruns: u32,
+    pub host_interference_reruns: u32,
 }
 
 /// Replay of one episode with its recorded answers.
@@ -72,9 +72,13 @@ impl StepSink for ReplayRows {
             .extend_from_slice(row.world.constraint_values());
     }
 
-    fn end(&mut self, outcome: &EpisodeOutcome, host_noise_reruns: u32) -> Result<(), RecordError> {
+    fn end(
+        &mut self,
+        outcome: &EpisodeOutcome,
+        host_interference_reruns: u32,
+    ) -> Result<(), RecordError> {
         self.episodes
-            .end(outcome, host_noise_reruns)
+            .end(outcome, host_interference_reruns)
             .map_err(|error| RecordError {
                 what: "the episode's row".to_owned(),
                 source: error.into(),
@@ -147,10 +151,10 @@ impl EpisodeReplay<'_> {
             Err(difference) => Some(difference),
         });
         let steps = &mut self.running.sink().steps;
-        let played = RecordBatch::try_new(steps.schema().clone(), steps.take())
+        let simulated = RecordBatch::try_new(steps.schema().clone(), steps.take())
             .expect("the rows are built by their own schema");
         // A difference before the error is reported first.
-        if let Some(cell) = compare::first_row_difference(batch, &played) {
+        if let Some(cell) = compare::first_row_difference(batch, &simulated) {
             let step = first.saturating_add(u32::try_from(cell.row).unwrap_or(u32::MAX));
             return Err(self.step_difference(step, &cell.field, cell.recorded, cell.expected));
         }
@@ -301,9 +305,9 @@ impl EpisodeReplay<'_> {
         };
         // The number of re-runs cannot be simulated.
         let reruns = Columns(&recorded.row).int("host_noise_reruns", 0);
-        let host_noise_reruns = reruns.unwrap_or_default();
+        let host_interference_reruns = reruns.unwrap_or_default();
         let rows = self.running.sink();
-        if let Err(error) = rows.end(&outcome, host_noise_reruns) {
+        if let Err(error) = rows.end(&outcome, host_interference_reruns) {
             return Err(row_difference(
                 recorded,
                 "fault",
@@ -311,13 +315,13 @@ impl EpisodeReplay<'_> {
                 "a fault",
             ));
         }
-        let played = RecordBatch::try_new(rows.episodes.schema().clone(), rows.episodes.take())
+        let simulated = RecordBatch::try_new(rows.episodes.schema().clone(), rows.episodes.take())
             .expect("the row is built by its own schema");
-        match compare::first_row_difference(&recorded.row, &played) {
+        match compare::first_row_difference(&recorded.row, &simulated) {
             None => Ok(ReplayedEpisode {
                 outcome,
                 steps: std::mem::take(&mut rows.measured),
-                host_noise_reruns,
+                host_interference_reruns,
             }),
             Some(cell) => Err(row_difference(
                 recorded,

@@ -46,7 +46,7 @@ fn assert_refused(evaluation: &Evaluation, needle: &str) {
 }
 
 #[test]
-fn dataset_is_complete_and_has_the_direct_score() {
+fn dataset_is_complete_and_score_matches_the_reports() {
     let mut evaluation = two_tasks(swing_arm);
     let (dataset, archive) = evaluation.assemble("one.zip").unwrap();
     let result = dataset.result.clone();

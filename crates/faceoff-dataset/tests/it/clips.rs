@@ -188,7 +188,7 @@ fn clip_index_matches_the_dataset_for_each_episode() {
                 (Some(recorded), Some(found)) => {
                     assert_eq!(found.from, recorded.first_step + 1);
                     assert_eq!(found.samples, recorded.steps);
-                    assert_eq!(found.worst, recorded.max);
+                    assert_eq!(found.max_excess, recorded.max);
                     compared += 1;
                 }
                 (recorded, found) => panic!("{name}: {recorded:?} but {found:?}"),

@@ -344,7 +344,7 @@ fn clips_of_a_game_match_its_motion() {
             );
         }
         previous_last = positions.last().copied();
-        for end in &clip.header.breaks {
+        for end in &clip.header.rally_ends {
             assert!((first + 1..=first + samples).contains(&end.sample));
             score = end.score;
             rallies += 1;

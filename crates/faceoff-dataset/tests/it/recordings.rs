@@ -102,8 +102,8 @@ pub fn play(spec: &ShardSpec, agent: Option<Agent>, out: &Path) -> ShardReport {
         timing: SlotTiming {
             before_s: round_trips,
             during_s: round_trips,
-            longest_stall_s: 0.0,
-            host_noise_reruns: 0,
+            max_host_interference_s: 0.0,
+            host_interference_reruns: 0,
             platform_retries: spec.platform_retries,
         },
     };

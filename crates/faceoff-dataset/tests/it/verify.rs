@@ -40,20 +40,20 @@ fn forgery() -> Forgery {
     Forgery::copy_of(&played().folder())
 }
 
-/// Opens and verifies a dataset on `workers` threads.
-pub fn check(path: &Path, workers: usize) -> Result<VerifiedDataset, VerifyError> {
+/// Opens and verifies a dataset on `threads` threads.
+pub fn check(path: &Path, threads: usize) -> Result<VerifiedDataset, VerifyError> {
     verify(
         &Dataset::open(path, simulator().competition())?,
         simulator().as_ref(),
-        NonZero::new(workers).unwrap(),
+        NonZero::new(threads).unwrap(),
         &|| (),
     )
 }
 
-/// The difference that a verification with this number of worker threads finds.
+/// The difference that a verification with this number of threads finds.
 #[track_caller]
-fn difference(path: &Path, workers: usize) -> Difference {
-    match check(path, workers) {
+fn difference(path: &Path, threads: usize) -> Difference {
+    match check(path, threads) {
         Err(VerifyError::Differs(difference)) => *difference,
         other => panic!("{other:?}"),
     }
@@ -71,7 +71,7 @@ fn column_names(file: &str) -> Vec<String> {
 }
 
 #[test]
-fn recording_verifies_packed_unpacked_and_on_any_threads() {
+fn recording_verifies_zipped_unzipped_with_any_threads() {
     let played = played();
     let progress_calls = AtomicU32::new(0);
     let dataset = Dataset::open(&played.archive(), simulator().competition()).unwrap();
@@ -111,7 +111,7 @@ fn recording_verifies_packed_unpacked_and_on_any_threads() {
 }
 
 #[test]
-fn panic_in_a_worker_ends_the_verification() {
+fn panic_in_a_thread_ends_the_verification() {
     let dataset = Dataset::open(&played().archive(), simulator().competition()).unwrap();
     let panic = std::panic::catch_unwind(|| {
         verify(

@@ -18,7 +18,7 @@ struct Season {
     /// Evaluations of the first day, Alpha's and Beta's.
     evaluations: [EvaluationId; 2],
     /// A description and the bytes of each piece of data that must not be in a public archive.
-    secrets: Vec<(&'static str, Vec<u8>)>,
+    private_data: Vec<(&'static str, Vec<u8>)>,
 }
 
 fn good_outcome(task: Task, episode: u32) -> EpisodeOutcome {
@@ -106,7 +106,7 @@ impl Season {
             site,
             alpha,
             evaluations,
-            secrets: vec![
+            private_data: vec![
                 ("a password", b"$argon2id$".to_vec()),
                 ("a name", b"Ada Lovelace".to_vec()),
                 ("a user's id", person.into_bytes()),
@@ -126,11 +126,11 @@ impl Season {
         };
         let secret = season.site.store.season().await.unwrap().secret;
         season
-            .secrets
+            .private_data
             .push(("the secret", secret.as_bytes().to_vec()));
         for token in [&season.alpha.token, &string(&joined["secret"])] {
             let hash = faceoff_api::token::hash_token(token);
-            season.secrets.push(("a token's hash", hash.to_vec()));
+            season.private_data.push(("a token's hash", hash.to_vec()));
         }
         season
     }
@@ -376,7 +376,7 @@ async fn public_archive_has_no_private_data() {
             file.display()
         );
     }
-    for (description, part) in &season.secrets {
+    for (description, part) in &season.private_data {
         let is_credential = matches!(*description, "a password" | "a token's hash" | "the secret");
         if is_credential {
             assert!(
@@ -389,7 +389,7 @@ async fn public_archive_has_no_private_data() {
         is_found(b"Ada Lovelace"),
         "the organiser's archive has names: the search works"
     );
-    for (description, part) in &season.secrets {
+    for (description, part) in &season.private_data {
         let kept_by_organisers = [
             "an agent's log",
             "an agent's output",
@@ -412,7 +412,7 @@ async fn public_archive_has_no_private_data() {
     );
     for file in files_of(&folder.path().join("archive")) {
         let content = std::fs::read(&file).unwrap();
-        for (description, part) in &season.secrets {
+        for (description, part) in &season.private_data {
             assert!(
                 !contains_bytes(&content, part),
                 "{description} is in {}",
@@ -610,7 +610,7 @@ async fn public_archive_hides_organiser_data_from_organisers() {
 }
 
 #[tokio::test]
-async fn archive_is_made_one_at_a_time_and_dropped_when_unread() {
+async fn archives_are_made_one_at_a_time_and_stop_if_unread() {
     let season = Season::start().await;
     let site = &season.site;
     // The file is larger than all buffers between sender and reader, and cannot be compressed.
@@ -632,7 +632,7 @@ async fn archive_is_made_one_at_a_time_and_dropped_when_unread() {
     second.problem(503, "busy", &["only one"]);
     assert_eq!(second.header("retry-after"), "60");
     drop(unread_download);
-    // Waits until the sender before has ended: it may not have noticed yet that its client disconnected.
+    // Waits until the previous sender has ended: it may not have noticed yet that its client disconnected.
     let download = async |edition: &str| loop {
         let path = format!("/api/v1/season/archive?edition={edition}");
         let request = site.request(Method::GET, &path, Some(ADMIN));

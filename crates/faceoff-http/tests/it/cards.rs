@@ -1,8 +1,8 @@
-//! Tests of the pictures for cards that show a link: what they show, and that they show nothing which visitors may not see. Those of
-//! games are tested with the page of a game.
+//! Tests of cards, the pictures of link previews: their content, and that they contain nothing that visitors may not see. The cards
+//! of games are tested with the game page.
 
 use crate::{
-    clips::record_day,
+    clips::{record_open_day, record_released_day},
     html::attributes,
     site::{ADMIN, Answer, Site, TestTeam, result},
 };
@@ -173,13 +173,13 @@ async fn results_after_a_freeze_are_on_no_card() {
 
 #[tokio::test]
 async fn episode_card_shows_the_public_motion() {
-    let open = record_day(false).await;
-    let path = format!("{}/prepare/1/card.png", open.page);
-    for token in [None, Some(open.alpha.token.as_str()), Some(ADMIN)] {
-        let early = open.site.get(&path, token).await;
+    let unreleased = record_open_day().await;
+    let path = format!("{}/prepare/1/card.png", unreleased.page);
+    for token in [None, Some(unreleased.alpha.token.as_str()), Some(ADMIN)] {
+        let early = unreleased.site.get(&path, token).await;
         assert_eq!(early.status, 409, "{}", early.body);
     }
-    let day = record_day(true).await;
+    let day = record_released_day().await;
     let card = async |episode: u32, token| {
         let path = format!("{}/prepare/{episode}/card.png", day.page);
         fetch(&day.site, &path, token).await.png
@@ -218,7 +218,7 @@ async fn card_without_its_page_is_refused_like_the_page() {
 }
 
 #[tokio::test]
-async fn name_of_another_script_is_replaced() {
+async fn team_name_in_other_script_gives_nameless_card() {
     let site = Site::start().await;
     let [long, foreign] = ["An exceptionally long name of a team", "冰球"];
     let [long, foreign] = [site.team(long).await, site.team(foreign).await];
@@ -233,7 +233,7 @@ async fn name_of_another_script_is_replaced() {
 }
 
 #[tokio::test]
-async fn pages_name_their_card_with_a_text() {
+async fn pages_link_their_card_with_alternative_text() {
     let site = Site::start().await;
     let site = site.with_public_url("https://faceoff.example.org").await;
     let (alpha, _, evaluation) = site.team_with_evaluation("Alpha", "striker").await;

@@ -81,11 +81,17 @@ pub(crate) fn record_clips(folder: &std::path::Path) -> PathBuf {
     pack
 }
 
-/// A day of two teams. The first evaluation has clips; the second one is still open unless `is_over`.
-pub(crate) async fn record_day(is_over: bool) -> RecordedDay {
-    record_day_on(Site::start().await, is_over).await
+/// A released day of two teams. The first evaluation has clips.
+pub(crate) async fn record_released_day() -> RecordedDay {
+    record_day_on(Site::start().await, true).await
 }
 
+/// A day of two teams that is not released, because the second evaluation is still open. The first one has clips.
+pub(crate) async fn record_open_day() -> RecordedDay {
+    record_day_on(Site::start().await, false).await
+}
+
+/// A day of two teams. The first evaluation has clips; the second one is still open unless `is_over`.
 async fn record_day_on(site: Site, is_over: bool) -> RecordedDay {
     let [alpha, beta] = [site.team("Alpha").await, site.team("Beta").await];
     let alpha_submission = site.valid_submission(&alpha, "striker").await;
@@ -139,7 +145,7 @@ impl RecordedDay {
 
 #[tokio::test]
 async fn episodes_are_hidden_before_the_release() {
-    let day = record_day(false).await;
+    let day = record_open_day().await;
     let alpha = Some(day.alpha.token.as_str());
     for path in [
         "episodes",
@@ -159,7 +165,7 @@ async fn episodes_are_hidden_before_the_release() {
 
 #[tokio::test]
 async fn motion_is_public_and_observations_follow_the_dataset() {
-    let day = record_day(true).await;
+    let day = record_released_day().await;
     let alpha = Some(day.alpha.token.as_str());
     let beta = Some(day.beta.token.as_str());
     for token in [None, beta, alpha, Some(ADMIN)] {
@@ -264,7 +270,7 @@ async fn blind_stage_hides_episodes() {
 
 #[tokio::test]
 async fn clip_is_compressed_and_cached_by_etag() {
-    let day = record_day(true).await;
+    let day = record_released_day().await;
     let path = "episodes/prepare/0/motion";
     let (headers, compressed) = day.bytes(path, "br, gzip").await;
     assert_eq!(headers["content-encoding"], "gzip");
@@ -285,8 +291,8 @@ async fn clip_is_compressed_and_cached_by_etag() {
 }
 
 #[tokio::test]
-async fn list_shows_stills_that_browsers_keep() {
-    let day = record_day(true).await;
+async fn episode_list_shows_stills_with_long_cache_time() {
+    let day = record_released_day().await;
     let page = day.page("").await;
     let image = Selector::parse(".episodes tbody img").unwrap();
     let addresses: Vec<_> = page
@@ -351,8 +357,8 @@ async fn frozen_boards_hide_stills() {
 }
 
 #[tokio::test]
-async fn marks_of_maps_lead_to_replays() {
-    let day = record_day(true).await;
+async fn table_map_marks_link_to_replays() {
+    let day = record_released_day().await;
     let page = day.page("").await;
     let links = Selector::parse(".table-map a").unwrap();
     let found: Vec<_> = page
@@ -396,7 +402,7 @@ async fn evaluation_without_clips_has_no_replays() {
 
 #[tokio::test]
 async fn episodes_page_is_filtered_by_its_query() {
-    let day = record_day(true).await;
+    let day = record_released_day().await;
     let view: Value = day.get("episodes", None).await.json(200);
     let lines = view["episodes"].as_array().unwrap();
     let unfiltered_page = day.page("").await;
@@ -443,7 +449,7 @@ async fn episodes_page_is_filtered_by_its_query() {
 
 #[tokio::test]
 async fn replay_page_is_complete_without_its_script() {
-    let day = record_day(true).await;
+    let day = record_released_day().await;
     let view: Value = day.get("episodes", None).await.json(200);
     let page = day.page("/prepare/1").await;
     let cause = view["episodes"][1]["why"].as_str().unwrap();

@@ -58,7 +58,7 @@ async fn assert_steady(site: &Site, grace: &mut Browser<'_>) {
 }
 
 #[tokio::test]
-async fn clock_step_is_told_and_changes_nothing() {
+async fn clock_step_is_reported_and_changes_nothing() {
     let (site, mut claim) = running_site().await;
     let mut grace = grace(&site).await;
     assert_steady(&site, &mut grace).await;
@@ -164,7 +164,7 @@ async fn only_organisers_accept_a_clock_step() {
 }
 
 #[tokio::test]
-async fn start_before_the_newest_change_is_told() {
+async fn server_start_before_newest_change_is_reported() {
     let site = Site::start_with_schedule("06:00").await;
     let start = ClockStart {
         zero_at: None,
@@ -183,7 +183,7 @@ async fn start_before_the_newest_change_is_told() {
 }
 
 #[tokio::test]
-async fn future_day_is_told_and_can_be_voided() {
+async fn future_day_is_reported_and_can_be_voided() {
     let site = Site::start_with_schedule("06:00").await;
     // The clock was five days ahead for a minute, with an earlier version or because an organiser accepted it.
     site.advance(5 * 86_400);

@@ -15,7 +15,7 @@ async fn set_counting(site: &Site, standings: Value) {
 
 /// The outcomes of an agent that solves the first `solved` episodes of each task, and violates the bounds of the end effector
 /// (3 penalty points) in the first `violated` ones.
-fn agent(solved: u32, violated: u32) -> impl Fn(Task, u32) -> EpisodeOutcome {
+fn outcomes_with(solved: u32, violated: u32) -> impl Fn(Task, u32) -> EpisodeOutcome {
     move |task, episode| EpisodeOutcome {
         success: episode < solved,
         violations: [(EE, episode < violated)].into_iter().collect(),
@@ -40,9 +40,9 @@ async fn board(site: &Site, path: &str) -> Value {
 #[tokio::test]
 async fn board_rows_are_newest_best_or_mean_as_configured() {
     let site = Site::start().await;
-    let [first_evaluation] = site.run_day(20, [("Alpha", &agent(10, 0))]).await;
-    let second = run_day(&site, agent(16, 5)).await;
-    let third = run_day(&site, agent(4, 1)).await;
+    let [first_evaluation] = site.run_day(20, [("Alpha", &outcomes_with(10, 0))]).await;
+    let second = run_day(&site, outcomes_with(16, 5)).await;
+    let third = run_day(&site, outcomes_with(4, 1)).await;
     let first_evaluation = first_evaluation.to_string();
 
     let newest = board(&site, "").await;
@@ -130,12 +130,18 @@ async fn board_rows_are_newest_best_or_mean_as_configured() {
 #[tokio::test]
 async fn means_of_the_same_days_are_compared_pairwise() {
     let site = Site::start().await;
-    site.run_day(200, [("Alpha", &agent(100, 0)), ("Beta", &agent(120, 0))])
-        .await;
+    site.run_day(
+        200,
+        [
+            ("Alpha", &outcomes_with(100, 0)),
+            ("Beta", &outcomes_with(120, 0)),
+        ],
+    )
+    .await;
     site.next_day();
     site.start_day().await;
     for _ in 0..2 {
-        site.run_evaluation(agent(100, 0)).await;
+        site.run_evaluation(outcomes_with(100, 0)).await;
     }
     set_counting(&site, json!({ "mean_of_last": 2 })).await;
     let mean = board(&site, "").await;
@@ -173,8 +179,14 @@ async fn changed_counting_of_an_open_stage_needs_confirmation() {
 #[tokio::test]
 async fn final_day_replaces_the_board_once_it_has_started() {
     let site = Site::start().await;
-    site.run_day(20, [("Alpha", &agent(16, 0)), ("Beta", &agent(4, 0))])
-        .await;
+    site.run_day(
+        20,
+        [
+            ("Alpha", &outcomes_with(16, 0)),
+            ("Beta", &outcomes_with(4, 0)),
+        ],
+    )
+    .await;
     set_counting(&site, json!("final")).await;
     let stage = site.stage().await;
     let path = format!("/api/v1/stages/{stage}/final");
@@ -220,7 +232,7 @@ async fn final_day_replaces_the_board_once_it_has_started() {
         .await
         .problem(409, "conflict", &["had its cutoff", "only one"]);
     // Only one team has a result of the final day so far, so the board has one row.
-    site.run_evaluation(agent(5, 0)).await;
+    site.run_evaluation(outcomes_with(5, 0)).await;
     let current = board(&site, "").await;
     assert_eq!(
         (
@@ -229,7 +241,7 @@ async fn final_day_replaces_the_board_once_it_has_started() {
         ),
         (&json!("final"), 1)
     );
-    site.run_evaluation(agent(9, 0)).await;
+    site.run_evaluation(outcomes_with(9, 0)).await;
     let scores: Vec<_> = board(&site, "").await["rows"]
         .as_array()
         .unwrap()
@@ -248,8 +260,14 @@ async fn final_day_replaces_the_board_once_it_has_started() {
 #[tokio::test]
 async fn frozen_board_ignores_the_final_day() {
     let site = Site::start().await;
-    site.run_day(20, [("Alpha", &agent(16, 0)), ("Beta", &agent(4, 0))])
-        .await;
+    site.run_day(
+        20,
+        [
+            ("Alpha", &outcomes_with(16, 0)),
+            ("Beta", &outcomes_with(4, 0)),
+        ],
+    )
+    .await;
     set_counting(&site, json!("final")).await;
     let path = format!("/api/v1/stages/{}", site.stage().await);
     site.change_first_stage(json!({ "closes_at": "2026-03-01T20:00:00Z" }))
@@ -265,7 +283,7 @@ async fn frozen_board_ignores_the_final_day() {
     site.post(&format!("{path}/final"), Some(ADMIN), &json!({}))
         .await
         .json(200);
-    site.run_evaluation(agent(5, 0)).await;
+    site.run_evaluation(outcomes_with(5, 0)).await;
     let frozen = board(&site, "").await;
     assert_eq!(
         (&frozen["rows"], &frozen["rows_by"]),

@@ -53,7 +53,7 @@ fn field(list: &Value, name: &str) -> Vec<String> {
 }
 
 #[tokio::test]
-async fn removed_organiser_does_not_come_back() {
+async fn removing_an_organiser_ends_their_credentials() {
     let site = Site::start().await;
     let grace = organiser(&site, "Grace").await;
     let linus = organiser(&site, "Linus").await;
@@ -109,7 +109,7 @@ async fn removed_organiser_does_not_come_back() {
     let log = get(&site, "/events?kind=invitation_revoked", ADMIN).await;
     assert_eq!(log["events"].as_array().unwrap().len(), 3);
 
-    // Enabled again, it is the webhook of the organiser who did it.
+    // The organiser who enables the webhook again becomes its owner.
     let enable = json!({ "state": "alive" });
     site.patch(&format!("/api/v1{path}"), Some(&linus.token), &enable)
         .await
@@ -158,9 +158,9 @@ async fn team_token_renews_and_ends_only_itself() {
     let listed = get(&site, "/tokens", &secret).await;
     assert_eq!(field(&listed, "id"), [string(&brief["id"])]);
     let all = get(&site, "/tokens", &ada.token).await;
-    let endless = all.as_array().unwrap().iter();
-    let endless = endless.map(|token| string(&token["id"]));
-    let others: Vec<String> = endless.filter(|id| !own.ends_with(id)).collect();
+    let ids = all.as_array().unwrap().iter();
+    let ids = ids.map(|token| string(&token["id"]));
+    let others: Vec<String> = ids.filter(|id| !own.ends_with(id)).collect();
     assert_eq!(others.len(), 2, "the team's first token, and Ada's");
     for id in others {
         post(&site, &format!("/tokens/{id}/rotate"), &secret, &json!({}))
@@ -181,7 +181,7 @@ async fn team_token_renews_and_ends_only_itself() {
 }
 
 #[tokio::test]
-async fn return_link_is_single_and_short() {
+async fn return_link_replaces_older_one_and_expires_in_24_h() {
     let site = Site::start().await;
     let ada = organiser(&site, "Ada").await;
     let link = json!({ "role": "return", "person": ada.id, "note": "Ada" });
@@ -205,7 +205,7 @@ async fn return_link_is_single_and_short() {
 }
 
 #[tokio::test]
-async fn new_access_ends_what_the_user_had_made() {
+async fn new_password_or_return_ends_credentials_user_made() {
     let site = Site::start().await;
     let alpha = site.team("Alpha").await;
     let ada = member(&site, &alpha.id, "Ada").await;
@@ -240,7 +240,7 @@ async fn new_access_ends_what_the_user_had_made() {
 }
 
 #[tokio::test]
-async fn token_revoked_by_others_ends_what_it_made() {
+async fn token_revoked_by_others_ends_credentials_it_made() {
     let site = Site::start().await;
     let alpha = site.team("Alpha").await;
     let ada = member(&site, &alpha.id, "Ada").await;
@@ -275,7 +275,7 @@ async fn token_revoked_by_others_ends_what_it_made() {
 }
 
 #[tokio::test]
-async fn stolen_token_cannot_cut_off_what_it_made() {
+async fn revoked_token_ends_credentials_made_through_others() {
     let site = Site::start().await;
     let alpha = site.team("Alpha").await;
     let ada = member(&site, &alpha.id, "Ada").await;
@@ -284,7 +284,7 @@ async fn stolen_token_cannot_cut_off_what_it_made() {
         (string(&made["id"]), string(&made["secret"]))
     };
     let (stolen_id, stolen) = make(&ada.token, "stolen").await;
-    // Its own end, or a new secret, does not separate a token from what made it.
+    // Deleting or rotating a token does not detach it from the token that made it.
     let (middle_id, middle) = make(&stolen, "middle").await;
     let (_, last) = make(&middle, "last").await;
     delete(&site, &format!("/tokens/{middle_id}"), &middle)
@@ -362,7 +362,7 @@ async fn approved_registration_ends_with_its_organiser() {
 }
 
 #[tokio::test]
-async fn page_lists_what_ended() {
+async fn removal_page_lists_revoked_credentials() {
     let site = Site::start().await;
     let alpha = site.team("Alpha").await;
     let ada = member(&site, &alpha.id, "Ada").await;

@@ -326,7 +326,7 @@ async fn search_knows_questions_forms_typos_and_synonyms() {
 }
 
 #[tokio::test]
-async fn listings_are_coloured_and_prompts_are_apart() {
+async fn code_is_highlighted_and_prompts_are_marked() {
     let site = Site::start().await;
     let page = fetch_page(&site, "/docs/start").await;
     let listings = select_all(&page, ".prose pre");

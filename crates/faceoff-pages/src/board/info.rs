@@ -210,7 +210,7 @@ fn points_by_violation(competition: &Competition) -> String {
     let kinds = competition
         .violations
         .iter()
-        .map(|kind| format!("{} {}", kind.breach, kind.points_text()));
+        .map(|kind| format!("{} {}", kind.description, kind.points_text()));
     kinds.collect::<Vec<_>>().join(", ")
 }
 

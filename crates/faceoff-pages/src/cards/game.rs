@@ -134,7 +134,7 @@ impl Scene {
     fn new(clip: &Clip, last: u32) -> Self {
         let header = &clip.header;
         let index = |sample: u32| sample.saturating_sub(header.first) as usize;
-        let ends = header.breaks.iter().map(|end| end.sample);
+        let ends = header.rally_ends.iter().map(|end| end.sample);
         let rally_start = ends
             .filter(|end| *end < last)
             .max()

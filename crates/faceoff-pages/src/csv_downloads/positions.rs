@@ -1,6 +1,6 @@
 //! Columns with positions in the table of episodes. Of other worlds than air hockey no positions are known.
 
-use faceoff_replay::{EpisodeLine, ViolationSummary};
+use faceoff_replay::{EpisodeIndexEntry, ViolationSummary};
 use faceoff_service::csv::or_empty;
 
 /// Ends of the names of the columns of a kind of violation.
@@ -14,8 +14,8 @@ pub(super) fn state_columns() -> impl Iterator<Item = String> {
 }
 
 /// The cells of [`state_columns`].
-pub(super) fn states(summary: &EpisodeLine) -> impl Iterator<Item = String> {
-    let states = [summary.start, summary.last].into_iter();
+pub(super) fn states(summary: &EpisodeIndexEntry) -> impl Iterator<Item = String> {
+    let states = [summary.puck_at_start, summary.puck_at_end].into_iter();
     let numbers = states.flat_map(|state| state.map_or([None; 4], |state| state.map(Some)));
     numbers.map(or_empty)
 }

@@ -5,7 +5,7 @@ use crate::{
     replay_section::Still,
 };
 use faceoff_api::{requests::BoardQuery, views::board::BoardRow};
-use faceoff_replay::EpisodeLine;
+use faceoff_replay::EpisodeIndexEntry;
 use faceoff_service::{
     app::App,
     problem::Problem,
@@ -87,7 +87,7 @@ async fn worst_failed(
     summaries.retain(|summary| !summary.success && summary.has_clips());
     summaries.sort_by_key(|summary| Reverse(badness(summary)));
     let mut tasks = Vec::new();
-    let (mut worst, others): (Vec<EpisodeLine>, Vec<EpisodeLine>) =
+    let (mut worst, others): (Vec<EpisodeIndexEntry>, Vec<EpisodeIndexEntry>) =
         summaries.into_iter().partition(|summary| {
             let is_first = !tasks.contains(&summary.task);
             tasks.push(summary.task);
@@ -110,6 +110,6 @@ async fn worst_failed(
     Ok(failed)
 }
 
-fn badness(summary: &EpisodeLine) -> (usize, u32) {
+fn badness(summary: &EpisodeIndexEntry) -> (usize, u32) {
     (summary.violations.len(), summary.late_answers)
 }

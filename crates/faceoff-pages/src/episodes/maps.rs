@@ -6,7 +6,7 @@ use crate::{
     table_drawing::{self, Dot, Position},
     violation_map::ViolationMarks,
 };
-use faceoff_replay::{Constraint, EpisodeLine};
+use faceoff_replay::{Constraint, EpisodeIndexEntry};
 use faceoff_types::Task;
 
 /// Largest number of marks of a map that are links: beyond, they would overlap, and make the page large.
@@ -24,8 +24,8 @@ pub(super) struct EpisodeLink {
 }
 
 impl EpisodeLink {
-    fn new(summary: &EpisodeLine, position: Position, what: &str) -> Self {
-        let EpisodeLine { task, episode, .. } = summary;
+    fn new(summary: &EpisodeIndexEntry, position: Position, what: &str) -> Self {
+        let EpisodeIndexEntry { task, episode, .. } = summary;
         Self {
             address: format!("episodes/{task}/{episode}"),
             name: format!("{task} {episode}: {what}"),
@@ -68,8 +68,8 @@ pub(super) struct SuccessRow {
 }
 
 impl StartMap {
-    pub(super) fn new(task: Task, summaries: &[&EpisodeLine]) -> Option<Self> {
-        let summaries: Vec<&EpisodeLine> = summaries
+    pub(super) fn new(task: Task, summaries: &[&EpisodeIndexEntry]) -> Option<Self> {
+        let summaries: Vec<&EpisodeIndexEntry> = summaries
             .iter()
             .copied()
             .filter(|summary| summary.task == task && summary.has_clips())
@@ -82,7 +82,7 @@ impl StartMap {
                 .iter()
                 .filter(|summary| summary.success == success);
             episodes
-                .filter_map(|summary| summary.start)
+                .filter_map(|summary| summary.puck_at_start)
                 .map(|[x, y, ..]| [x, y])
                 .collect()
         };
@@ -94,7 +94,7 @@ impl StartMap {
             false => has_failed,
         });
         let links = linked.filter_map(|summary| {
-            let [x, y, ..] = summary.start?;
+            let [x, y, ..] = summary.puck_at_start?;
             let what = match summary.success {
                 true => "solved",
                 false => "not solved",
@@ -141,13 +141,14 @@ fn speed([_, _, vx, vy]: [f64; 4]) -> f64 {
 
 /// Success by ranges of a value, each `width` wide. Empty ranges are omitted; a single range gives no rows.
 fn success_by(
-    summaries: &[&EpisodeLine],
+    summaries: &[&EpisodeIndexEntry],
     value: impl Fn([f64; 4]) -> f64,
     unit: &str,
     width: f64,
 ) -> Vec<SuccessRow> {
-    let range_index =
-        |summary: &EpisodeLine| (value(summary.start.unwrap_or_default()) / width).floor();
+    let range_index = |summary: &EpisodeIndexEntry| {
+        (value(summary.puck_at_start.unwrap_or_default()) / width).floor()
+    };
     let mut range_indices: Vec<f64> = summaries
         .iter()
         .map(|summary| range_index(summary))
@@ -199,7 +200,7 @@ pub(super) struct Joint {
 }
 
 impl ViolationMap {
-    pub(super) fn new(summaries: &[&EpisodeLine]) -> Self {
+    pub(super) fn new(summaries: &[&EpisodeIndexEntry]) -> Self {
         let violations = || summaries.iter().flat_map(|summary| &summary.violations);
         let marks = ViolationMarks::by_constraint(|constraint| {
             let matching =

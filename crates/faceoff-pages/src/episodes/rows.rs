@@ -2,7 +2,7 @@
 
 use super::still;
 use crate::{episode_text::describe_violation, format, replay::page_path};
-use faceoff_replay::EpisodeLine;
+use faceoff_replay::EpisodeIndexEntry;
 use faceoff_types::{Competition, EvaluationId, Task};
 
 /// An episode in the table.
@@ -25,10 +25,10 @@ impl Row {
     pub(super) fn new(
         competition: &Competition,
         id: EvaluationId,
-        summary: &EpisodeLine,
+        summary: &EpisodeIndexEntry,
         still_version: &str,
     ) -> Self {
-        let EpisodeLine { task, episode, .. } = summary;
+        let EpisodeIndexEntry { task, episode, .. } = summary;
         Self {
             task: *task,
             episode: *episode,

@@ -18,9 +18,9 @@ pub struct GameOrigin {
 
 /// A game under way, and what is needed to repeat its current rally.
 #[derive(Debug, Clone)]
-pub struct TableGame {
+pub struct ReplayableGame {
     /// The simulated game.
-    pub game: Game,
+    pub simulation: Game,
     /// What it started from.
     pub origin: GameOrigin,
     /// Whether the game has ended.
@@ -35,7 +35,7 @@ pub struct TableGame {
     plant: Arc<Plant>,
 }
 
-impl TableGame {
+impl ReplayableGame {
     /// A game at its start. The arms of `previous` are used if they are the same.
     pub fn start(settings: &GameSettings, origin: GameOrigin, previous: Option<&Self>) -> Self {
         let plant = match previous {
@@ -51,7 +51,7 @@ impl TableGame {
     fn new(game: Game, origin: GameOrigin, plant: Arc<Plant>) -> Self {
         Self {
             rally_start: game.progress(),
-            game,
+            simulation: game,
             origin,
             is_over: false,
             actions: Vec::new(),
@@ -84,16 +84,18 @@ impl TableGame {
             formats[robot].command(action, &mut self.commanded[robot], &mut command);
             commands[robot] = Some(command);
         }
-        let step = self.game.step([0, 1].map(|robot| match &commands[robot] {
-            Some(command) => Command::Act(command),
-            None => Command::Late,
-        }));
+        let step = self
+            .simulation
+            .step([0, 1].map(|robot| match &commands[robot] {
+                Some(command) => Command::Act(command),
+                None => Command::Late,
+            }));
         if step.rally_end.is_some() {
             self.commanded = [INITIAL_Q; 2];
-            self.rally_start = self.game.progress();
+            self.rally_start = self.simulation.progress();
             self.actions.clear();
         }
-        self.is_over = self.game.steps() >= settings.max_steps
+        self.is_over = self.simulation.steps() >= settings.max_steps
             || settings.ends_at_divergence && step.divergence.is_some();
         step
     }
@@ -124,8 +126,8 @@ impl TableGame {
         for (step, both) in actions.chunks_exact(len).enumerate() {
             let (first, second) = both.split_at(first_len);
             let actions = [
-                present(&formats[0], first, step)?,
-                present(&formats[1], second, step)?,
+                checked_action(&formats[0], first, step)?,
+                checked_action(&formats[1], second, step)?,
             ];
             if game.step(settings, actions).rally_end.is_some() {
                 return Err(argument_error(
@@ -140,7 +142,7 @@ impl TableGame {
 }
 
 /// The action of a robot, checked; `None` if the robot was not commanded.
-fn present<'a>(
+fn checked_action<'a>(
     format: &ActionFormat,
     action: &'a [f64],
     step: usize,

@@ -16,7 +16,7 @@ use crate::{
     pool::{Pool, pool_if_parallel},
     step::Autoreset,
 };
-use game::{GameOrigin, TableGame};
+use game::{GameOrigin, ReplayableGame};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use rayon::prelude::*;
@@ -36,7 +36,7 @@ pub struct Games {
 
 enum State {
     /// Empty before the first reset.
-    Open(Vec<TableGame>),
+    Open(Vec<ReplayableGame>),
     Closed,
     /// A step panicked.
     Failed,
@@ -82,7 +82,7 @@ impl Games {
             ));
         }
         let settings = &*this.settings;
-        let origin = |seed: Option<u64>, game: Option<&TableGame>| match (seed, game) {
+        let origin = |seed: Option<u64>, game: Option<&ReplayableGame>| match (seed, game) {
             (Some(seed), _) => GameOrigin { seed, number: 0 },
             (None, previous) => GameOrigin {
                 seed: previous.map_or(0, |game| game.origin.seed),
@@ -90,12 +90,12 @@ impl Games {
             },
         };
         let pool = pool_if_parallel(&mut this.pool)?;
-        let started: Vec<Option<TableGame>> = py.detach(|| {
+        let started: Vec<Option<ReplayableGame>> = py.detach(|| {
             catch_panic(|| {
                 let start = |index: usize| {
                     let previous = games.get(index);
                     let origin = origin(seeds[index], previous);
-                    mask[index].then(|| TableGame::start(settings, origin, previous))
+                    mask[index].then(|| ReplayableGame::start(settings, origin, previous))
                 };
                 Ok(match pool {
                     None => (0..mask.len()).map(start).collect(),
@@ -139,7 +139,7 @@ impl Games {
         let pool = pool_if_parallel(&mut this.pool)?;
         let games = this.state.open_games()?;
         check_call_order(games, autoreset)?;
-        let step = |index: usize, game: &mut TableGame, row: &mut GameRow<'_>| {
+        let step = |index: usize, game: &mut ReplayableGame, row: &mut GameRow<'_>| {
             let own = [0, 1].map(|robot: usize| {
                 let len = lens[robot];
                 slices[robot].map(|actions| &actions[index * len..][..len])
@@ -210,14 +210,14 @@ impl Games {
     /// The seed and number of each game.
     fn origins(slf: &Bound<'_, Self>) -> PyResult<Vec<(u64, u32)>> {
         let this = &mut *borrow_mut(slf)?;
-        let origin = |game: &TableGame| (game.origin.seed, game.origin.number);
+        let origin = |game: &ReplayableGame| (game.origin.seed, game.origin.number);
         Ok(this.state.open_games()?.iter().map(origin).collect())
     }
 
     /// The present true state of a game, [`GAME_STATE_LEN`] numbers.
     fn state(slf: &Bound<'_, Self>, index: usize) -> PyResult<Vec<f64>> {
         let this = &mut *borrow_mut(slf)?;
-        Ok(flatten(&this.game(index)?.game.state()))
+        Ok(flatten(&this.game(index)?.simulation.state()))
     }
 
     /// Number of threads of the pool.
@@ -262,7 +262,7 @@ impl Games {
         Ok(actions)
     }
 
-    fn game(&mut self, index: usize) -> PyResult<&mut TableGame> {
+    fn game(&mut self, index: usize) -> PyResult<&mut ReplayableGame> {
         let count = self.count;
         let games = self.state.open_games()?;
         if games.is_empty() {
@@ -275,7 +275,7 @@ impl Games {
 }
 
 impl State {
-    fn open_games(&mut self) -> PyResult<&mut Vec<TableGame>> {
+    fn open_games(&mut self) -> PyResult<&mut Vec<ReplayableGame>> {
         match self {
             Self::Open(games) => Ok(games),
             Self::Closed => Err(closed_error()),
@@ -288,7 +288,7 @@ impl State {
 fn step_one(
     settings: &GameSettings,
     autoreset: Autoreset,
-    game: &mut TableGame,
+    game: &mut ReplayableGame,
     actions: [Option<&[f64]>; 2],
     row: &mut GameRow<'_>,
 ) {
@@ -297,9 +297,9 @@ fn step_one(
         row.write_start(game);
         return;
     }
-    let before = game.game.referee().score();
+    let before = game.simulation.referee().score();
     let step = game.step(settings, actions);
-    let after = game.game.referee().score();
+    let after = game.simulation.referee().score();
     let points = [0, 1].map(|robot| after[robot] - before[robot]);
     row.write_step(game, &step, points);
     if game.is_over && autoreset == Autoreset::SameStep {
@@ -308,7 +308,7 @@ fn step_one(
     }
 }
 
-fn check_call_order(games: &[TableGame], autoreset: Autoreset) -> PyResult<()> {
+fn check_call_order(games: &[ReplayableGame], autoreset: Autoreset) -> PyResult<()> {
     if games.is_empty() {
         return Err(missing_reset_error());
     }

@@ -1,7 +1,7 @@
 //! Output arrays of the games' steps, a row per game, in memory of Python. The *facts* of a game are 23 numbers about its
 //! last step.
 
-use super::game::TableGame;
+use super::game::ReplayableGame;
 use crate::{errors::argument_error, observation};
 use faceoff_sim::{
     Game, GameState, GameStep, JOINTS, RallyEnd,
@@ -86,31 +86,32 @@ impl GameRows<'_> {
 
 impl GameRow<'_> {
     /// Writes the row of a game that was started or restored.
-    pub fn write_start(&mut self, game: &TableGame) {
-        write_both(&game.game, self.observations);
-        self.state.copy_from_slice(&flatten(&game.game.state()));
+    pub fn write_start(&mut self, game: &ReplayableGame) {
+        write_both(&game.simulation, self.observations);
+        self.state
+            .copy_from_slice(&flatten(&game.simulation.state()));
         self.facts.fill(0.0);
         self.facts[..2].fill(-1.0);
         self.write_counts(game, [0; 2]);
     }
 
     /// Writes the row of a game after a step that gained these points for each side.
-    pub fn write_step(&mut self, game: &TableGame, step: &GameStep, points: [u32; 2]) {
-        write_both(&game.game, self.observations);
+    pub fn write_step(&mut self, game: &ReplayableGame, step: &GameStep, points: [u32; 2]) {
+        write_both(&game.simulation, self.observations);
         self.state.copy_from_slice(&flatten(&step.state));
         self.write_facts(game, step, points);
     }
 
     /// Writes the observations of a new game; those of the game before it become the final ones.
-    pub fn write_successor(&mut self, next: &TableGame) {
+    pub fn write_successor(&mut self, next: &ReplayableGame) {
         self.final_observations.copy_from_slice(self.observations);
-        write_both(&next.game, self.observations);
+        write_both(&next.simulation, self.observations);
     }
 
     /// Code of the rally's end in [`RALLY_ENDS`] and the robot that brought it about (−1: none), 2 × 4 constraint values (ee,
     /// link, joint_pos, joint_vel), whether each robot has made the world diverge, goals, fouls, score, points of the
     /// step, control steps of the game, its number, and whether it is over.
-    fn write_facts(&mut self, game: &TableGame, step: &GameStep, points: [u32; 2]) {
+    fn write_facts(&mut self, game: &ReplayableGame, step: &GameStep, points: [u32; 2]) {
         let (code, by) = match step.rally_end {
             None => (-1.0, None),
             Some(RallyEnd::Goal { by }) => (0.0, Some(by)),
@@ -137,13 +138,13 @@ impl GameRow<'_> {
         self.write_counts(game, points);
     }
 
-    fn write_counts(&mut self, game: &TableGame, points: [u32; 2]) {
-        let referee = game.game.referee();
+    fn write_counts(&mut self, game: &ReplayableGame, points: [u32; 2]) {
+        let referee = game.simulation.referee();
         let counts = [referee.goals, referee.fouls, referee.score(), points];
         for (fact, count) in self.facts[12..20].iter_mut().zip(counts.concat()) {
             *fact = f64::from(count);
         }
-        self.facts[20] = f64::from(game.game.steps());
+        self.facts[20] = f64::from(game.simulation.steps());
         self.facts[21] = f64::from(game.origin.number);
         self.facts[22] = f64::from(u8::from(game.is_over));
     }
@@ -167,8 +168,8 @@ pub fn flatten(state: &GameState) -> Vec<f64> {
 
 /// Games with their rows, for parallel processing.
 pub fn games_with_rows<'a, 'g, 'r>(
-    games: &'g mut [TableGame],
+    games: &'g mut [ReplayableGame],
     rows: &'a mut [GameRow<'r>],
-) -> impl IndexedParallelIterator<Item = (&'g mut TableGame, &'a mut GameRow<'r>)> {
+) -> impl IndexedParallelIterator<Item = (&'g mut ReplayableGame, &'a mut GameRow<'r>)> {
     games.par_iter_mut().zip(rows.par_iter_mut())
 }

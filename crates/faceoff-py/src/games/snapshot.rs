@@ -1,7 +1,7 @@
 //! Saved states of games.
 
 use super::{
-    game::{GameOrigin, TableGame},
+    game::{GameOrigin, ReplayableGame},
     settings::GameSettings,
 };
 use crate::errors::{argument_error, catch_panic, check_version};
@@ -21,7 +21,7 @@ use std::sync::Arc;
 #[pyclass(frozen, module = "faceoff._native")]
 pub struct GameSnapshot {
     pub settings: Arc<GameSettings>,
-    pub game: TableGame,
+    pub game: ReplayableGame,
 }
 
 /// What a pickled state contains.
@@ -62,7 +62,7 @@ impl GameSnapshot {
     /// Control steps of the game so far.
     #[getter]
     fn steps(&self) -> u32 {
-        self.game.game.steps()
+        self.game.simulation.steps()
     }
 
     fn __repr__(&self) -> String {
@@ -70,7 +70,7 @@ impl GameSnapshot {
             "<state of a game: seed {}, game {}, step {}>",
             self.game.origin.seed,
             self.game.origin.number,
-            self.game.game.steps()
+            self.game.simulation.steps()
         )
     }
 
@@ -161,7 +161,7 @@ pub fn load_game(py: Python<'_>, data: &[u8]) -> PyResult<GameSnapshot> {
         .iter()
         .map(|number| number.unwrap_or(f64::NAN))
         .collect();
-    let replay = || TableGame::replay(&settings, origin, &progress, &actions);
+    let replay = || ReplayableGame::replay(&settings, origin, &progress, &actions);
     let mut game = py.detach(|| catch_panic(replay))?;
     game.is_over = saved.is_over;
     Ok(GameSnapshot {

@@ -16,9 +16,9 @@ pub const JOINT_MARGIN_RAD: f64 = 0.01;
 /// Margin of elbow and wrist to their minimum height.
 pub const HEIGHT_MARGIN_M: f64 = 0.01;
 /// A *pose* (the angles of all joints) is a solution if its end effector is this close to the point.
-pub const TOLERANCE_M: f64 = 1e-6;
+pub const SOLUTION_TOLERANCE_M: f64 = 1e-6;
 /// The least-squares iteration stops when the end effector is this close to the point.
-pub const GOAL_M: f64 = 1e-10;
+pub const CONVERGENCE_TOLERANCE_M: f64 = 1e-10;
 /// Most iterations of the least squares.
 pub const ITERATIONS: usize = 100;
 /// Longest step of an iteration, in joint space.

@@ -1,7 +1,7 @@
 //! Inverse kinematics from a start pose: damped least squares, each joint weighted by its velocity limit.
 
 use super::{
-    constants::{Arm, DAMPING, GOAL_M, ITERATIONS, LOWEST_M, STEP_LIMIT_RAD},
+    constants::{Arm, CONVERGENCE_TOLERANCE_M, DAMPING, ITERATIONS, LOWEST_M, STEP_LIMIT_RAD},
     pose::{jacobian, kinematics_at},
 };
 use faceoff_sim::{JOINTS, dynamics::spatial::Vec3};
@@ -19,7 +19,7 @@ pub fn solve_near(arm: &Arm, point: Vec3<f64>, start: &[f64; JOINTS]) -> [f64; J
         let wrist = kinematics.links[JOINTS - 1].origin;
         let error = point - kinematics.end_effector.origin;
         let deficit = LOWEST_M - wrist.z;
-        if error.dot(error).sqrt() < GOAL_M && deficit <= 0.0 {
+        if error.dot(error).sqrt() < CONVERGENCE_TOLERANCE_M && deficit <= 0.0 {
             break;
         }
         let linearisation = Linearisation {
@@ -29,23 +29,23 @@ pub fn solve_near(arm: &Arm, point: Vec3<f64>, start: &[f64; JOINTS]) -> [f64; J
             deficit,
         };
         let mut step = linearisation.step(&arm.weight);
-        let is_stuck: [bool; JOINTS] = from_fn(|joint| {
+        let is_at_bound: [bool; JOINTS] = from_fn(|joint| {
             let (angle, bound) = (q[joint], arm.bound_rad[joint]);
             (angle + step[joint]).abs() > bound && angle.abs() >= bound && angle * step[joint] > 0.0
         });
-        if is_stuck.contains(&true) {
-            let usable = from_fn(|joint| {
-                if is_stuck[joint] {
+        if is_at_bound.contains(&true) {
+            let unblocked_weight = from_fn(|joint| {
+                if is_at_bound[joint] {
                     0.0
                 } else {
                     arm.weight[joint]
                 }
             });
-            step = linearisation.step(&usable);
+            step = linearisation.step(&unblocked_weight);
         }
         let length = inner(&step, &step).sqrt();
-        let share = (STEP_LIMIT_RAD / length.max(1e-300)).min(1.0);
-        q = from_fn(|joint| within(joint, q[joint] + share * step[joint]));
+        let step_fraction = (STEP_LIMIT_RAD / length.max(1e-300)).min(1.0);
+        q = from_fn(|joint| within(joint, q[joint] + step_fraction * step[joint]));
     }
     q
 }
@@ -70,17 +70,18 @@ impl Linearisation {
             return step;
         }
         let desired: [f64; JOINTS] = from_fn(|joint| weight[joint] * self.rise[joint]);
-        let moved = self
+        let end_effector_shift = self
             .columns
             .iter()
             .zip(desired)
             .fold(Vec3::zero(), |sum, (column, desired)| {
                 sum + column.scale(desired)
             });
-        let held = least_change(&self.columns, moved, weight);
-        let free: [f64; JOINTS] = from_fn(|joint| desired[joint] - held[joint]);
-        let share = self.deficit / inner(&self.rise, &free).max(1e-3);
-        from_fn(|joint| step[joint] + share * free[joint])
+        let compensation = least_change(&self.columns, end_effector_shift, weight);
+        let null_space_change: [f64; JOINTS] =
+            from_fn(|joint| desired[joint] - compensation[joint]);
+        let null_space_fraction = self.deficit / inner(&self.rise, &null_space_change).max(1e-3);
+        from_fn(|joint| step[joint] + null_space_fraction * null_space_change[joint])
     }
 }
 

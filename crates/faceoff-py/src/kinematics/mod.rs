@@ -13,7 +13,7 @@ mod posture;
 use arrays::{
     Input, Output, check_same_length, map_row_pairs, map_rows, rows, rows_mut, without_gil,
 };
-use constants::{ARM, Arm, LOWEST_M, TOLERANCE_M, X_MIN_M, Y_MAX_M};
+use constants::{ARM, Arm, LOWEST_M, SOLUTION_TOLERANCE_M, X_MIN_M, Y_MAX_M};
 use faceoff_sim::{
     JOINTS,
     dynamics::spatial::Vec3,
@@ -166,8 +166,11 @@ pub fn arm_constants(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     for (name, value) in [
         ("JOINT_MARGIN_RAD", constants::JOINT_MARGIN_RAD),
         ("HEIGHT_MARGIN_M", constants::HEIGHT_MARGIN_M),
-        ("TOLERANCE_M", TOLERANCE_M),
-        ("GOAL_M", constants::GOAL_M),
+        ("SOLUTION_TOLERANCE_M", SOLUTION_TOLERANCE_M),
+        (
+            "CONVERGENCE_TOLERANCE_M",
+            constants::CONVERGENCE_TOLERANCE_M,
+        ),
         ("STEP_LIMIT_RAD", constants::STEP_LIMIT_RAD),
         ("DAMPING", constants::DAMPING),
         ("HAND_PER_REACH_RAD_M", constants::HAND_PER_REACH_RAD_M),
@@ -192,7 +195,7 @@ fn is_solution(arm: &Arm, q: &[f64; JOINTS], point: Vec3<f64>) -> bool {
     let kinematics = kinematics_at(q);
     let error = point - kinematics.end_effector.origin;
     let [elbow, wrist] = elbow_and_wrist_m(&kinematics);
-    error.dot(error) <= TOLERANCE_M * TOLERANCE_M
+    error.dot(error) <= SOLUTION_TOLERANCE_M * SOLUTION_TOLERANCE_M
         && elbow.min(wrist) >= LOWEST_M - 1e-9
         && q.iter()
             .zip(arm.bound_rad)

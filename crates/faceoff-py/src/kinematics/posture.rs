@@ -1,5 +1,6 @@
-//! Inverse kinematics in closed form: one *posture* (joint angles) per point, in a vertical plane, elbow up. The arm in that
-//! plane is a chain of upper arm, forearm and hand (from joint 6 to the end effector).
+//! Inverse kinematics in closed form. The *posture* of a point is the one pose (joint angles) that reaches it with the arm in
+//! a vertical plane and the elbow up. The arm in that plane is a chain of upper arm, forearm and hand (from joint 6 to the end
+//! effector).
 
 use super::constants::{
     Arm, FOREARM_M, HAND_M, HAND_PER_REACH_RAD_M, SHOULDER_M, START_HAND_RAD, UPPER_ARM_M,
@@ -45,12 +46,13 @@ pub fn velocities(arm: &Arm, point: [f64; 3], [vx, vy, vz]: [f64; 3]) -> [f64; J
     let ahead_rate = outwards - HAND_M * cos_hand * hand_rate;
     let above_rate = vz + HAND_M * sin_hand * hand_rate;
     // A stretched arm cannot move outwards; the result is a large joint velocity.
-    let span = libm::sin(upper - forearm);
-    let span = span.abs().max(1e-6).copysign(span);
+    let sin_elbow = libm::sin(upper - forearm);
+    let sin_elbow = sin_elbow.abs().max(1e-6).copysign(sin_elbow);
     let (sin_forearm, cos_forearm) = libm::sincos(forearm);
     let (sin_upper, cos_upper) = libm::sincos(upper);
-    let upper_rate = -(sin_forearm * ahead_rate + cos_forearm * above_rate) / (UPPER_ARM_M * span);
-    let forearm_rate = (cos_upper * above_rate + sin_upper * ahead_rate) / (FOREARM_M * span);
+    let upper_rate =
+        -(sin_forearm * ahead_rate + cos_forearm * above_rate) / (UPPER_ARM_M * sin_elbow);
+    let forearm_rate = (cos_upper * above_rate + sin_upper * ahead_rate) / (FOREARM_M * sin_elbow);
     [
         (x * vy - y * vx) / (reach * reach),
         upper_rate,

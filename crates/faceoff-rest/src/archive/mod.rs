@@ -75,7 +75,7 @@ pub(crate) async fn collect(app: &App, edition: Edition) -> Result<PreparedArchi
     let now = app.config.clock.now();
     let summaries = match edition {
         Edition::Public => missing_summaries(app).await?,
-        // It has the episodes themselves.
+        // The organiser's edition contains the datasets, from which the summaries can be computed.
         Edition::Organiser => MissingSummaries::default(),
     };
     let snapshot = app
@@ -160,13 +160,16 @@ pub(crate) async fn collect(app: &App, edition: Edition) -> Result<PreparedArchi
 /// The summaries of runs that have none, because they have just ended or the season was imported without.
 async fn missing_summaries(app: &App) -> Result<MissingSummaries, Problem> {
     let version = EpisodeSummary::VERSION;
-    let mut of_runs = Vec::new();
+    let mut json_by_run = Vec::new();
     for run in app.store.unsummarised_runs(version).await? {
         let summary = app.summaries.load_run(run).await?;
         let json = serde_json::to_string(&*summary).map_err(Problem::internal)?;
-        of_runs.push((run, json));
+        json_by_run.push((run, json));
     }
-    Ok(MissingSummaries { version, of_runs })
+    Ok(MissingSummaries {
+        version,
+        json_by_run,
+    })
 }
 
 /// An application state that shows the snapshot at its time, as a server with the imported archive does.

@@ -282,7 +282,7 @@ pub(super) async fn add_artifacts(
             continue;
         };
         let source = app.store.artifacts().local_path(&artifact.key)?;
-        let problem = match files::hash(source.clone()).await? {
+        let checked_hash = match files::hash(source.clone()).await? {
             Ok((hashed_bytes, blake3))
                 if hashed_bytes == bytes
                     && artifact.blake3.is_none_or(|expected| expected == blake3) =>
@@ -292,7 +292,7 @@ pub(super) async fn add_artifacts(
             Ok(_) => Err("the file is damaged".to_owned()),
             Err(error) => Err(format!("the file cannot be read ({error})")),
         };
-        let blake3 = match problem {
+        let blake3 = match checked_hash {
             Ok(blake3) => blake3,
             Err(problem) => {
                 tracing::error!(%path, problem, "left out of the season archive");

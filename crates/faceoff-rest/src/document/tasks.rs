@@ -18,7 +18,7 @@ pub(super) fn describe(document: &mut Value, competition: &Competition) {
         .tasks
         .iter()
         .map(|info| format!("\n- `{}`: {}", info.task, info.aim));
-    name_keys(document);
+    reference_task_keys(document);
     let schemas = &mut document["components"]["schemas"];
     schemas[&*Task::name()] = json!({
         "type": "string",
@@ -35,14 +35,14 @@ pub(super) fn describe(document: &mut Value, competition: &Competition) {
         "enum": competition.ends.iter().map(|info| info.end.as_str()).collect::<Vec<_>>(),
     });
     let limits = competition.world_violations();
-    let breaches = competition
+    let descriptions = competition
         .violations
         .iter()
         .filter(|info| info.name != ViolationName::COMPUTATION_TIME)
-        .map(|info| format!("\n- `{}`: {}", info.name, info.breach));
+        .map(|info| format!("\n- `{}`: {}", info.name, info.description));
     schemas[&*ViolationName::name()] = json!({
         "type": "string",
-        "description": format!("A kind of violation.\n{}", breaches.collect::<String>()),
+        "description": format!("A kind of violation.\n{}", descriptions.collect::<String>()),
         "enum": limits.map(|name| name.to_string()).collect::<Vec<_>>(),
     });
     let profiles = competition
@@ -57,7 +57,7 @@ pub(super) fn describe(document: &mut Value, competition: &Competition) {
     let kinds = competition.violations.iter();
     let kinds = kinds.map(|info| {
         let schema =
-            json!({"type": "integer", "format": "int32", "minimum": 0, "description": info.breach});
+            json!({"type": "integer", "format": "int32", "minimum": 0, "description": info.description});
         (info.name.to_string(), schema)
     });
     let violations: Map<String, Value> = kinds.collect();
@@ -157,19 +157,21 @@ fn magnitude(info: &MagnitudeInfo) -> Value {
     schema
 }
 
-/// Keys of maps by task have the schema of tasks.
-fn name_keys(value: &mut Value) {
+/// Lets the keys of maps by task refer to the schema of tasks.
+fn reference_task_keys(value: &mut Value) {
     match value {
         Value::Object(object) => {
             // The keys of these maps have the schema of tasks before it is replaced.
-            let of_any_task = serde_json::to_value(Task::schema()).ok();
-            if object.get("propertyNames") == of_any_task.as_ref() && of_any_task.is_some() {
-                let of_tasks = json!({"$ref": format!("#/components/schemas/{}", Task::name())});
-                object.insert("propertyNames".to_owned(), of_tasks);
+            let any_task_schema = serde_json::to_value(Task::schema()).ok();
+            if object.get("propertyNames") == any_task_schema.as_ref() && any_task_schema.is_some()
+            {
+                let task_reference =
+                    json!({"$ref": format!("#/components/schemas/{}", Task::name())});
+                object.insert("propertyNames".to_owned(), task_reference);
             }
-            object.values_mut().for_each(name_keys);
+            object.values_mut().for_each(reference_task_keys);
         }
-        Value::Array(items) => items.iter_mut().for_each(name_keys),
+        Value::Array(items) => items.iter_mut().for_each(reference_task_keys),
         _ => {}
     }
 }
@@ -179,7 +181,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn tasks_of_the_competition_are_the_values() {
+    fn schemas_describe_the_competition() {
         let by_task = json!({"type": "object", "propertyNames": Task::schema()});
         let by_name = json!({"type": "object", "propertyNames": {"type": "string"}});
         let mut document = json!({"components": {"schemas": {"Task": {"type": "string"}, "ByTask": by_task, "ByName": by_name,

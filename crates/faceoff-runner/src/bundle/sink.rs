@@ -33,7 +33,7 @@ pub(super) struct FileAttributes {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Special {
     /// The device 0/0, with which overlayfs marks hidden files.
-    NullDevice,
+    OverlayfsWhiteout,
     Device,
     Pipe,
 }

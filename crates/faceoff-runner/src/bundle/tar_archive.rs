@@ -107,7 +107,7 @@ pub(super) fn unpack<'a>(
                             && is_zero(header.device_major())
                             && is_zero(header.device_minor());
                         let special = if is_null {
-                            Special::NullDevice
+                            Special::OverlayfsWhiteout
                         } else {
                             Special::Device
                         };
@@ -192,7 +192,7 @@ fn read_pax(mut bytes: &[u8], extensions: &mut Extensions) -> Result<(), BundleE
         match key {
             b"path" => extensions.path = Some(value.to_vec()),
             b"linkpath" => extensions.link = Some(value.to_vec()),
-            // An invalid parse_number becomes a size that no header has.
+            // An invalid number becomes a size that no header has.
             b"size" => extensions.size = Some(parse_number(value).unwrap_or(u64::MAX)),
             b"GNU.sparse.name" => {
                 extensions.is_sparse = true;

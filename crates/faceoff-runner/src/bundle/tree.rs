@@ -206,7 +206,7 @@ impl Sink for Tree<'_> {
         Err(unusable(
             entry,
             match special {
-                Special::NullDevice | Special::Device => "a device",
+                Special::OverlayfsWhiteout | Special::Device => "a device",
                 Special::Pipe => "a named pipe",
             },
         ))

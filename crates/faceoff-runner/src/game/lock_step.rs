@@ -203,20 +203,20 @@ fn wait_for_both(
 /// time used in this delay counts towards the next step, as in any game.
 const FREEZE_DELAY: Duration = Duration::from_micros(200);
 
-/// Waits for the late side after the other has answered.
+/// Waits for the side whose answer is still pending, after the other has answered.
 fn wait_for_last(
-    late: &mut SidePlayer<'_>,
+    pending: &mut SidePlayer<'_>,
     other: &mut SidePlayer<'_>,
     after_answer: AfterAnswer,
 ) -> Result<(), PlatformFault> {
     if after_answer == AfterAnswer::Freeze {
-        late.poll(Instant::now() + FREEZE_DELAY)?;
-        if late.pending_session().is_none() {
+        pending.poll(Instant::now() + FREEZE_DELAY)?;
+        if pending.pending_session().is_none() {
             return Ok(());
         }
         other.freeze();
     }
-    late.poll(Instant::now() + TimeLimits::MAX_WAIT)
+    pending.poll(Instant::now() + TimeLimits::MAX_WAIT)
 }
 
 fn missing_freezer_error() -> SandboxError {

@@ -177,14 +177,17 @@ pub fn play_game<S: GameSink>(
             sink,
         }
     });
-    let [(first_log, first_stall_s), (second_log, second_stall_s)] = sides.map(SidePlayer::close);
+    let [
+        (first_log, first_max_host_interference_s),
+        (second_log, second_max_host_interference_s),
+    ] = sides.map(SidePlayer::abort);
     observer.log(Side::First, &first_log);
     observer.log(Side::Second, &second_log);
     let [first, second] = calibrations;
     let calibration = GameCalibration {
         sides: [
-            first.finish(first_stall_s, 0, spec.platform_retries),
-            second.finish(second_stall_s, 0, spec.platform_retries),
+            first.finish(first_max_host_interference_s, 0, spec.platform_retries),
+            second.finish(second_max_host_interference_s, 0, spec.platform_retries),
         ],
     };
     Ok((finished?, calibration, [first_log, second_log]))

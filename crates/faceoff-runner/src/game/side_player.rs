@@ -35,7 +35,7 @@ pub(super) struct SidePlayer<'a> {
     /// The wait for the missing answer, if a timeout ended the agent.
     wait: Option<WaitBreakdown>,
     log: Log,
-    longest_stall_s: f64,
+    max_host_interference_s: f64,
 }
 
 /// A violation of the protocol or of a limit by one side.
@@ -109,7 +109,7 @@ impl<'a> SidePlayer<'a> {
             result: None,
             wait: None,
             log: Log::new(env.limits.stderr_tail_bytes),
-            longest_stall_s: 0.0,
+            max_host_interference_s: 0.0,
         }
     }
 
@@ -177,7 +177,7 @@ impl<'a> SidePlayer<'a> {
         match session.poll(deadline) {
             Ok(None) => {}
             Ok(Some(timing)) => {
-                self.longest_stall_s = self.longest_stall_s.max(timing.host_time_s);
+                self.max_host_interference_s = self.max_host_interference_s.max(timing.host_time_s);
                 self.result = Some(Ok(timing));
             }
             Err(error) => self.result = Some(Err(SideFailure::new(error, self.asked_at)?)),
@@ -289,10 +289,10 @@ impl<'a> SidePlayer<'a> {
 
     /// Kills the agent if it runs. Returns the log of all its processes, and the longest host interference in one
     /// answer in seconds.
-    pub fn close(mut self) -> (String, f64) {
+    pub fn abort(mut self) -> (String, f64) {
         if let Some(session) = self.session.take() {
             self.log.add(&session.abort(), None);
         }
-        (self.log.into_text(), self.longest_stall_s)
+        (self.log.into_text(), self.max_host_interference_s)
     }
 }

@@ -9,7 +9,7 @@ use tempfile::TempDir;
 
 /// A complete agent that keeps its initial pose, with hooks for misbehaviour: `on_hello(hello)`, `on_reset(episode)` and
 /// `on_step(step, answer)`, which returns the line to send, or `None` for no answer.
-const FRAME: &str = r#"
+const AGENT_TEMPLATE: &str = r#"
 import json, os, sys, time
 INTERPOLATION = 3
 def on_hello(hello): pass
@@ -44,7 +44,7 @@ for line in sys.stdin:
         break
 "#;
 
-/// A bundle whose agent is [`FRAME`] with hooks.
+/// A bundle whose agent is [`AGENT_TEMPLATE`] with hooks.
 pub struct Agent {
     _dir: TempDir,
     pub bundle: Bundle,
@@ -53,15 +53,15 @@ pub struct Agent {
 impl Agent {
     /// An agent without misbehaviour.
     pub fn behaving() -> Self {
-        Self::with("")
+        Self::with_hooks("")
     }
 
     /// An agent with these hooks, in Python.
-    pub fn with(hooks: &str) -> Self {
-        Self::script(&FRAME.replace("#HOOKS", hooks))
+    pub fn with_hooks(hooks: &str) -> Self {
+        Self::script(&AGENT_TEMPLATE.replace("#HOOKS", hooks))
     }
 
-    /// An agent with this Python program instead of [`FRAME`].
+    /// An agent with this Python program instead of [`AGENT_TEMPLATE`].
     pub fn script(script: &str) -> Self {
         let dir = tempfile::Builder::new()
             .permissions(fs::Permissions::from_mode(0o755))
@@ -92,7 +92,7 @@ impl Agent {
 }
 
 /// The full sandbox, with deadlines so long that load on the machine does not matter.
-pub fn sandboxed() -> AgentEnvironment {
+pub fn sandboxed_environment() -> AgentEnvironment {
     AgentEnvironment {
         limits: Limits {
             memory_bytes: 256 << 20,
@@ -108,7 +108,7 @@ pub fn sandboxed() -> AgentEnvironment {
             episode_extra_s: 600.0,
             resets_extra_s: 600.0,
             // Tests of other features must not depend on other load of the host.
-            host_noise_reruns: 0,
+            host_interference_reruns: 0,
             ..TimeLimits::default()
         },
         isolation: Isolation::Sandboxed {
@@ -129,15 +129,15 @@ pub fn sandboxed() -> AgentEnvironment {
 }
 
 /// The sandbox with a short step limit, for agents that never answer.
-pub fn with_short_step_limit() -> AgentEnvironment {
-    let mut env = sandboxed();
+pub fn short_step_limit_environment() -> AgentEnvironment {
+    let mut env = sandboxed_environment();
     env.time.step_s = 0.5;
     env
 }
 
 /// A developer's own agent, without the sandbox.
-pub fn unconfined() -> AgentEnvironment {
-    let mut env = sandboxed();
+pub fn unconfined_environment() -> AgentEnvironment {
+    let mut env = sandboxed_environment();
     env.isolation = Isolation::None;
     env.runtimes.insert(
         "python3".into(),

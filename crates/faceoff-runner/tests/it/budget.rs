@@ -15,7 +15,7 @@ use zip::{ZipWriter, write::FullFileOptions};
 
 const MIB: usize = 1 << 20;
 /// Part of the refusal of archives with too much overhead.
-const TOO_MUCH: &str = "more bytes than its files explain";
+const OVERHEAD_REFUSAL: &str = "more bytes than its files explain";
 
 /// The result of unpacking an archive.
 fn verdict(bytes: &[u8]) -> Result<(), BundleError> {
@@ -44,11 +44,14 @@ fn headers_without_entries_are_counted() {
     for kind in [EntryType::XHeader, EntryType::XGlobalHeader] {
         let bomb = repeated(kind, &comment, 20).gz();
         assert!(bomb.len() < MIB, "{} bytes", bomb.len());
-        assert_refused(&bomb, TOO_MUCH);
+        assert_refused(&bomb, OVERHEAD_REFUSAL);
     }
     for kind in [EntryType::GNULongName, EntryType::GNULongLink] {
-        assert_refused(&repeated(kind, &vec![b'n'; MIB], 20).gz(), TOO_MUCH);
-        assert_refused(&repeated(kind, &vec![b'n'; MIB], 20).zst(), TOO_MUCH);
+        assert_refused(&repeated(kind, &vec![b'n'; MIB], 20).gz(), OVERHEAD_REFUSAL);
+        assert_refused(
+            &repeated(kind, &vec![b'n'; MIB], 20).zst(),
+            OVERHEAD_REFUSAL,
+        );
     }
 }
 
@@ -56,7 +59,10 @@ fn headers_without_entries_are_counted() {
 fn skipped_content_is_counted() {
     // The tar library skips this content by reading it.
     for kind in [EntryType::Directory, EntryType::Symlink] {
-        assert_refused(&repeated(kind, &vec![0; 30 * MIB], 1).gz(), TOO_MUCH);
+        assert_refused(
+            &repeated(kind, &vec![0; 30 * MIB], 1).gz(),
+            OVERHEAD_REFUSAL,
+        );
     }
     // Sparse files are refused by their header, before their content is read.
     let sparse = repeated(EntryType::GNUSparse, &[0; 512], 1).gz();
@@ -122,9 +128,12 @@ fn empty_blocks_are_counted() {
             .file("agent.py", 0o644, b"print()")
             .gz()
     };
-    let with = |blocks: usize| [stream(blocks), whole()].concat();
-    verdict(&with(1 << 20)).unwrap();
-    assert_refused(&with(4 << 20), "larger than its content");
+    let archive_with_empty_blocks = |blocks: usize| [stream(blocks), whole()].concat();
+    verdict(&archive_with_empty_blocks(1 << 20)).unwrap();
+    assert_refused(
+        &archive_with_empty_blocks(4 << 20),
+        "larger than its content",
+    );
     // Incompressible content is accepted, and so is the padding of a tape block.
     let mut state = 1_u32;
     let random_bytes: Vec<u8> = (0..20 * MIB)
@@ -284,7 +293,7 @@ fn zip_with_shared_bytes_is_refused() {
     assert_refused(&shared_zip(3, 1000), "agent.toml: ");
     let bomb = shared_zip(200, MIB);
     assert!(bomb.len() < MIB + MIB / 8, "{} bytes", bomb.len());
-    assert_refused(&bomb, TOO_MUCH);
+    assert_refused(&bomb, OVERHEAD_REFUSAL);
 }
 
 #[test]

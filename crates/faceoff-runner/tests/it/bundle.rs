@@ -97,7 +97,7 @@ fn single_top_folder_is_the_bundle() {
 }
 
 #[test]
-fn wrong_manifest_key_is_named() {
+fn invalid_manifest_refusal_says_why() {
     let tar = |text: &str| Tar::new().file("agent.toml", 0o644, text.as_bytes()).gz();
     assert_refused(&tar("name = 3"), "agent.toml:");
     assert_refused(
@@ -112,7 +112,7 @@ fn wrong_manifest_key_is_named() {
 }
 
 #[test]
-fn files_that_systems_add_are_left_out() {
+fn files_added_by_operating_systems_are_left_out() {
     let metadata = b"\0\x05\x16\x07";
     // A zip of macOS's Finder, of a folder in which a Windows computer has left settings, too.
     let finder = zip(&[

@@ -1,7 +1,7 @@
 //! Datasets of real agents: independent of the number of workers, and verifiable by a new simulation.
 
 use crate::{
-    agents::{Agent, sandboxed},
+    agents::{Agent, sandboxed_environment},
     recording::{moving_agent, read_table},
     shard::{run, spec},
 };
@@ -61,7 +61,7 @@ fn recordings_of_one_and_three_workers_are_equal() {
                         run(
                             &spec(DEFEND, *start..*end),
                             &agent,
-                            &sandboxed(),
+                            &sandboxed_environment(),
                             &dirs[index],
                         )
                         .unwrap();
@@ -115,7 +115,13 @@ fn meta() -> EvaluationMeta {
 fn play_and_verify(agent: &Agent, task: Task, episodes: u32) -> VerifiedDataset {
     let dir = tempfile::tempdir().unwrap();
     let shard = dir.path().join("shard");
-    run(&spec(task, 0..episodes), agent, &sandboxed(), &shard).unwrap();
+    run(
+        &spec(task, 0..episodes),
+        agent,
+        &sandboxed_environment(),
+        &shard,
+    )
+    .unwrap();
     let archive = dir.path().join("dataset.zip");
     assemble(&meta(), &[shard], &archive, None, simulator().as_ref()).unwrap();
     let workers = NonZero::new(2).unwrap();
@@ -131,7 +137,7 @@ fn play_and_verify(agent: &Agent, task: Task, episodes: u32) -> VerifiedDataset 
 #[test]
 fn recordings_with_faults_verify() {
     assert_eq!(play_and_verify(&moving_agent(), HIT, 2).episodes, 2);
-    let agent = Agent::with(
+    let agent = Agent::with_hooks(
         "now = 0\n\
          def on_reset(episode):\n    global now; now = episode\n    \
          if episode == 2: sys.exit(3)\n\
@@ -148,7 +154,7 @@ fn diverged_world_is_an_agent_fault_and_verifies() {
     let dir = tempfile::tempdir().unwrap();
     let shard = dir.path().join("shard");
     // Accelerates each joint in the direction in which it moves already.
-    let agent = Agent::with(
+    let agent = Agent::with_hooks(
         "INTERPOLATION = None\n\
          def on_hello(hello): print('start', file=sys.stderr)\n\
          def on_step(step, answer):\n    \
@@ -156,7 +162,13 @@ fn diverged_world_is_an_agent_fault_and_verifies() {
          answer['action'] = [[push, push, push]] * 20\n    \
          return json.dumps(answer)",
     );
-    let report = run(&spec(PREPARE, 0..2), &agent, &sandboxed(), &shard).unwrap();
+    let report = run(
+        &spec(PREPARE, 0..2),
+        &agent,
+        &sandboxed_environment(),
+        &shard,
+    )
+    .unwrap();
     let faults: Vec<_> = report.outcomes.iter().map(|o| o.fault.clone()).collect();
     // The first world diverges; the second has extreme motion but stays finite.
     let [Some(fault), None] = &faults[..] else {

@@ -1,7 +1,7 @@
 //! CPU time that an agent uses without a pending question counts as its time, or is prevented by freezing.
 
 use crate::{
-    agents::{Agent, sandboxed},
+    agents::{Agent, sandboxed_environment},
     game,
     recording::{read_table, seconds},
     shard::{run, spec},
@@ -11,14 +11,14 @@ use faceoff_runner::{AgentEnvironment, GameObserver, run_game};
 use faceoff_sandbox::affinity;
 
 /// The agent and the evaluator share one CPU.
-fn on_last_cpu() -> AgentEnvironment {
-    let mut env = sandboxed();
+fn last_cpu_environment() -> AgentEnvironment {
+    let mut env = sandboxed_environment();
     env.agent_cpus = vec![*affinity::allowed_cpus().unwrap().last().unwrap()];
     env
 }
 
 /// Computes all the time, also without a question.
-const SPINS: &str = "import threading\n\
+const SPINNING_HOOKS: &str = "import threading\n\
     def spin():\n    \
     while True: pass\n\
     def on_hello(hello): sys.setswitchinterval(1e-4); threading.Thread(target=spin, daemon=True).start()";
@@ -28,8 +28,8 @@ fn cpu_time_between_answer_and_question_counts() {
     let out = tempfile::tempdir().unwrap();
     let report = run(
         &spec(HIT, 0..1),
-        &Agent::with(SPINS),
-        &on_last_cpu(),
+        &Agent::with_hooks(SPINNING_HOOKS),
+        &last_cpu_environment(),
         out.path(),
     );
     assert_eq!(report.unwrap().outcomes[0].fault, None);
@@ -57,8 +57,8 @@ impl GameObserver for NullObserver {
 /// late, so the minimum over many steps is checked.
 #[test]
 fn answered_side_is_frozen_on_shared_cpus() {
-    let computing = Agent::with(&format!(
-        "import atexit\n{SPINS}\n\
+    let computing = Agent::with_hooks(&format!(
+        "import atexit\n{SPINNING_HOOKS}\n\
          answered, computed = None, []\n\
          def on_step(step, answer):\n    \
          global answered\n    \
@@ -69,9 +69,9 @@ fn answered_side_is_frozen_on_shared_cpus() {
          atexit.register(lambda: print('least', min(computed), file=sys.stderr))"
     ));
     let sleeping =
-        Agent::with("def on_step(step, answer): time.sleep(0.1); return json.dumps(answer)");
+        Agent::with_hooks("def on_step(step, answer): time.sleep(0.1); return json.dumps(answer)");
     let out = tempfile::tempdir().unwrap();
-    let env = on_last_cpu();
+    let env = last_cpu_environment();
     let played = run_game(
         &game::spec(40),
         [&computing.bundle, &sleeping.bundle],

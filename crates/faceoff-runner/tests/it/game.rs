@@ -1,6 +1,6 @@
 //! Games between real agents: the sides do not affect each other.
 
-use crate::agents::{Agent, sandboxed};
+use crate::agents::{Agent, sandboxed_environment};
 use faceoff_airhockey::EVALUATION;
 use faceoff_dataset::game::{GAME_FILE, GameRecording, side_file, verify_game};
 use faceoff_runner::{
@@ -53,7 +53,7 @@ fn play_in(
 /// Runs a game and verifies it.
 fn play(spec: &GameSpec, agents: [&Agent; 2]) -> GameReport {
     let out = tempfile::tempdir().unwrap();
-    let env = sandboxed();
+    let env = sandboxed_environment();
     let report = play_in(spec, agents, [&env; 2], out.path());
     assert_verifies(out.path(), &report);
     report
@@ -86,7 +86,7 @@ fn without_times(outcome: &GameOutcome) -> GameOutcome {
 
 /// The sides of a game between the tested agent and an agent that behaves.
 fn play_against_behaving(spec: &GameSpec, hooks: &str) -> [SideOutcome; 2] {
-    let (tested, opponent) = (Agent::with(hooks), Agent::behaving());
+    let (tested, opponent) = (Agent::with_hooks(hooks), Agent::behaving());
     let report = play(spec, [&tested, &opponent]);
     let [tested, opponent] = without_times(&report.archives.outcome).sides;
     assert_eq!(opponent.faults, []);
@@ -113,15 +113,15 @@ fn kinds(side: &SideOutcome) -> Vec<(&AgentFaultKind, Option<u32>, Option<u32>)>
 #[test]
 fn game_verifies_and_is_reproducible() {
     let agents = [
-        Agent::with(
+        Agent::with_hooks(
             "def on_hello(hello): print(hello['task'], hello['agent_id'], file=sys.stderr)\n\
              def on_step(step, answer):\n    \
              answer['action'][0][0] += 0.002 * (step % 40); return json.dumps(answer)",
         ),
-        Agent::with("INTERPOLATION = 1"),
+        Agent::with_hooks("INTERPOLATION = 1"),
     ];
     let dirs = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
-    let env = sandboxed();
+    let env = sandboxed_environment();
     let reports = dirs.each_ref().map(|dir| {
         let report = play_in(&spec(1700), [&agents[0], &agents[1]], [&env; 2], dir.path());
         assert_verifies(dir.path(), &report);
@@ -156,9 +156,9 @@ fn game_verifies_and_is_reproducible() {
 
 #[test]
 fn side_file_holds_nothing_of_the_other_side_and_no_seed() {
-    let agent = Agent::with("def on_reset(episode): print('SECRET', file=sys.stderr)");
+    let agent = Agent::with_hooks("def on_reset(episode): print('SECRET', file=sys.stderr)");
     let out = tempfile::tempdir().unwrap();
-    let env = sandboxed();
+    let env = sandboxed_environment();
     let spec = spec(20);
     play_in(&spec, [&agent, &Agent::behaving()], [&env; 2], out.path());
     let seeds = [spec.seed, spec.mismatch_seed].map(|seed| seed.to_string());
@@ -194,7 +194,7 @@ fn late_answers_are_dropped_and_cost_only_their_side() {
     // Only deliberate sleeps are late: the bound is far above the answer times on a busy host.
     let mut spec = spec(60);
     spec.limits.in_time_s = 2.0;
-    let slow = Agent::with(
+    let slow = Agent::with_hooks(
         "def on_step(step, answer):\n    \
          answer['action'][0][0] += 0.2\n    \
          if step in (5, 6, 30): time.sleep(2.1)\n    \
@@ -215,7 +215,7 @@ fn late_answers_are_dropped_and_cost_only_their_side() {
 fn always_late_agent_never_moves_its_arm() {
     let mut spec = spec(200);
     spec.limits.in_time_s = 1e-9;
-    let swings = Agent::with(
+    let swings = Agent::with_hooks(
         "def on_step(step, answer):\n    \
          answer['action'][0][0] += 0.5; return json.dumps(answer)",
     );
@@ -229,12 +229,12 @@ fn always_late_agent_never_moves_its_arm() {
 
 #[test]
 fn silent_side_holds_its_arm_and_is_restarted_next_rally() {
-    let agent = Agent::with("def on_step(step, answer): return None");
-    let mut short_limit = sandboxed();
+    let agent = Agent::with_hooks("def on_step(step, answer): return None");
+    let mut short_limit = sandboxed_environment();
     short_limit.time.step_s = 0.2;
     let out = tempfile::tempdir().unwrap();
     let behaving = Agent::behaving();
-    let env = sandboxed();
+    let env = sandboxed_environment();
     let report = play_in(
         &spec(800),
         [&behaving, &agent],
@@ -328,7 +328,7 @@ fn extreme_actions_are_valid_until_the_world_diverges() {
 fn repeated_faults_forfeit_the_game() {
     let mut spec = spec(45_000);
     spec.limits.max_faults = 1;
-    let crashing = Agent::with("def on_reset(episode): os._exit(5)");
+    let crashing = Agent::with_hooks("def on_reset(episode): os._exit(5)");
     let behaving = Agent::behaving();
     let report = play(&spec, [&behaving, &crashing]);
     let (outcome, score) = (&report.archives.outcome, &report.archives.score);
@@ -366,12 +366,12 @@ fn used_up_game_time_forfeits_the_game() {
     let mut spec = spec(45_000);
     let agents = [
         Agent::behaving(),
-        Agent::with("def on_step(step, answer): time.sleep(0.3); return json.dumps(answer)"),
+        Agent::with_hooks("def on_step(step, answer): time.sleep(0.3); return json.dumps(answer)"),
     ];
     // Only the slow agent can use up this time, even on a busy host.
     let out = tempfile::tempdir().unwrap();
     spec.limits.total_s = 20.0;
-    let env = sandboxed();
+    let env = sandboxed_environment();
     let report = play_in(&spec, [&agents[0], &agents[1]], [&env; 2], out.path());
     assert_verifies(out.path(), &report);
     let GameEnd::Forfeit {
@@ -393,13 +393,13 @@ fn used_up_game_time_forfeits_the_game() {
 /// other side's time.
 #[test]
 fn diagnosis_of_one_side_is_not_on_the_others_clock() {
-    let closing = Agent::with(
+    let closing = Agent::with_hooks(
         "def on_step(step, answer):\n    \
          if step == 2: os.close(1); time.sleep(3600)\n    \
          return json.dumps(answer)",
     );
     let behaving = Agent::behaving();
-    let mut env = sandboxed();
+    let mut env = sandboxed_environment();
     env.time.bye_s = 3.0;
     let mut spec = spec(10);
     // At most the wait for the other agent's exit, and far more than answer times on a busy host.
@@ -447,7 +447,8 @@ fn cancelled_game_leaves_logs_and_no_recording() {
             self.steps == 3
         }
     }
-    let agent = Agent::with("def on_reset(episode): print('reset', file=sys.stderr, flush=True)");
+    let agent =
+        Agent::with_hooks("def on_reset(episode): print('reset', file=sys.stderr, flush=True)");
     let mut observer = CancellingObserver {
         starts: Vec::new(),
         logs: Vec::new(),
@@ -455,7 +456,7 @@ fn cancelled_game_leaves_logs_and_no_recording() {
         steps: 0,
     };
     let out = tempfile::tempdir().unwrap();
-    let env = sandboxed();
+    let env = sandboxed_environment();
     let bundles = [&agent.bundle; 2];
     let stopped = run_game(&spec(100), bundles, [&env; 2], out.path(), &mut observer);
     assert!(matches!(stopped, Err(PlatformFault::Cancelled)));

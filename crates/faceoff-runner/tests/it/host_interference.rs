@@ -2,7 +2,7 @@
 //! interference or with a fixed monitor.
 
 use crate::{
-    agents::{Agent, sandboxed, unconfined},
+    agents::{Agent, sandboxed_environment, unconfined_environment},
     recording::{floats, ints, read_table, seconds},
     shard::{RecordingObserver, run, spec, without_times},
 };
@@ -20,12 +20,12 @@ use std::{
 };
 
 /// Sleeps before it answers the second step of each episode.
-const SLEEPS: &str = "def on_step(step, answer):\n    \
+const SLEEPING_HOOKS: &str = "def on_step(step, answer):\n    \
     if step == 1: time.sleep(0.15)\n    \
     return json.dumps(answer)";
 
 /// Does not answer the fourth step.
-const HANGS: &str = "def on_hello(hello): print('a new process', file=sys.stderr)\n\
+const HANGING_HOOKS: &str = "def on_hello(hello): print('a new process', file=sys.stderr)\n\
     def on_step(step, answer):\n    \
     return None if step == 3 else json.dumps(answer)";
 
@@ -41,14 +41,14 @@ impl InterferenceMonitor for FixedShare {
 
 /// Sets the maximum reruns per episode, and per 100 episodes.
 fn with_reruns(mut env: AgentEnvironment, per_episode: u32, per_100: u32) -> AgentEnvironment {
-    env.time.host_noise_reruns = per_episode;
-    env.time.host_noise_reruns_per_100 = per_100;
+    env.time.host_interference_reruns = per_episode;
+    env.time.host_interference_reruns_per_100 = per_100;
     env
 }
 
 /// The sandbox with this step limit, for agents that do not answer in time.
 fn with_step_limit(step_s: f64) -> AgentEnvironment {
-    let mut env = sandboxed();
+    let mut env = sandboxed_environment();
     env.time.step_s = step_s;
     env
 }
@@ -74,10 +74,10 @@ fn run_monitored(
 #[test]
 fn sleeping_agent_is_not_excused() {
     let out = tempfile::tempdir().unwrap();
-    let env = with_reruns(sandboxed(), 2, 100);
-    let agent = Agent::with(SLEEPS);
+    let env = with_reruns(sandboxed_environment(), 2, 100);
+    let agent = Agent::with_hooks(SLEEPING_HOOKS);
     let report = run_monitored(&spec(HIT, 0..2), &agent, &env, &FixedShare(0.0), out.path());
-    assert_eq!(report.timing.host_noise_reruns, 0);
+    assert_eq!(report.timing.host_interference_reruns, 0);
     for outcome in &report.outcomes {
         assert!(outcome.computation_time.max_s >= 0.15, "{outcome:?}");
         let time = &outcome.computation_time;
@@ -90,10 +90,10 @@ fn sleeping_agent_is_not_excused() {
 #[test]
 fn late_answer_counts_without_host_interference() {
     let out = tempfile::tempdir().unwrap();
-    let env = with_reruns(sandboxed(), 2, 100);
-    let agent = Agent::with(SLEEPS);
+    let env = with_reruns(sandboxed_environment(), 2, 100);
+    let agent = Agent::with_hooks(SLEEPING_HOOKS);
     let report = run_monitored(&spec(HIT, 0..1), &agent, &env, &FixedShare(0.5), out.path());
-    assert_eq!(report.timing.host_noise_reruns, 0);
+    assert_eq!(report.timing.host_interference_reruns, 0);
     let steps = read_table(&out.path().join("steps.parquet"));
     let (counted, host) = (
         seconds(&steps, "computation_time_ns"),
@@ -109,7 +109,7 @@ fn late_answer_counts_without_host_interference() {
         counted.iter().copied().fold(0.0, f64::max)
     );
     assert_eq!(
-        report.timing.longest_stall_s,
+        report.timing.max_host_interference_s,
         host.iter().copied().fold(0.0, f64::max)
     );
 }
@@ -120,7 +120,7 @@ fn episode_ended_by_the_host_is_rerun_by_a_new_process() {
     let spec = spec(DEFEND, 0..2);
     // Without a sandbox the second process can detect that it is not the first.
     let mark = out.path().join("mark of the first process");
-    let agent = Agent::with(&format!(
+    let agent = Agent::with_hooks(&format!(
         "def on_hello(hello): print('a new process', file=sys.stderr)\n\
          def on_reset(episode): print('reset', episode, file=sys.stderr)\n\
          def on_step(step, answer):\n    \
@@ -128,11 +128,11 @@ fn episode_ended_by_the_host_is_rerun_by_a_new_process() {
          open({mark:?}, 'w').close(); return None\n    \
          return json.dumps(answer)"
     ));
-    let mut env = with_reruns(unconfined(), 2, 100);
+    let mut env = with_reruns(unconfined_environment(), 2, 100);
     env.time.step_s = 0.5;
     let dir = out.path().join("rerun");
     let report = run_monitored(&spec, &agent, &env, &FixedShare(1.0), &dir);
-    assert_eq!(report.timing.host_noise_reruns, 1);
+    assert_eq!(report.timing.host_interference_reruns, 1);
     let agent_lines: Vec<&str> = report
         .log
         .lines()
@@ -153,7 +153,7 @@ fn episode_ended_by_the_host_is_rerun_by_a_new_process() {
 
     // Same seed, same bits, as without the interruption.
     let plain = out.path().join("plain");
-    let undisturbed = run(&spec, &Agent::behaving(), &sandboxed(), &plain).unwrap();
+    let undisturbed = run(&spec, &Agent::behaving(), &sandboxed_environment(), &plain).unwrap();
     assert_eq!(
         without_times(&report.outcomes),
         without_times(&undisturbed.outcomes)
@@ -177,7 +177,7 @@ fn reruns_are_bounded_and_the_last_try_counts() {
         spec.max_faults = 10;
         let report = run_monitored(
             &spec,
-            &Agent::with(HANGS),
+            &Agent::with_hooks(HANGING_HOOKS),
             &env,
             &FixedShare(1.0),
             out.path(),
@@ -193,7 +193,7 @@ fn reruns_are_bounded_and_the_last_try_counts() {
         let episodes = read_table(&out.path().join("episodes.parquet"));
         assert_eq!(ints(&episodes, "host_noise_reruns").values(), &expected);
         let total: u32 = expected.iter().sum();
-        assert_eq!(report.timing.host_noise_reruns, total);
+        assert_eq!(report.timing.host_interference_reruns, total);
         // Every try had its own process.
         let processes = report.log.lines().filter(|line| *line == "a new process");
         let processes = processes.count();
@@ -210,7 +210,7 @@ fn hard_limit_is_extended_only_by_host_interference() {
         if step == 1: time.sleep(1.5)\n    \
         return json.dumps(answer)";
     let env = with_reruns(with_step_limit(1.0), 2, 100);
-    let agent = Agent::with(late);
+    let agent = Agent::with_hooks(late);
     let play = |share| {
         run_monitored(
             &spec(HIT, 0..1),
@@ -305,7 +305,7 @@ fn event_storms_of_the_agent_are_not_host_interference() {
     let out = tempfile::tempdir().unwrap();
     let cpu = *affinity::allowed_cpus().unwrap().last().unwrap();
     for (name, storm) in STORMS {
-        let agent = Agent::with(&format!(
+        let agent = Agent::with_hooks(&format!(
             "import ctypes, signal, threading\n\
              libc = ctypes.CDLL(None)\n\
              signal.signal(signal.SIGCONT, lambda *_: None)\n\
@@ -317,7 +317,7 @@ fn event_storms_of_the_agent_are_not_host_interference() {
              while time.monotonic_ns() < nanoseconds + 100_000_000: time.sleep(0.001)\n    \
              return json.dumps(answer)"
         ));
-        let mut env = with_reruns(sandboxed(), 2, 100);
+        let mut env = with_reruns(sandboxed_environment(), 2, 100);
         env.agent_cpus = vec![cpu];
         env.limits.pids = 40;
         let before_s = busy_s(cpu);
@@ -331,7 +331,7 @@ fn event_storms_of_the_agent_are_not_host_interference() {
         .unwrap();
         let after_s = busy_s(cpu);
         assert_eq!(report.outcomes[0].fault, None, "{name}");
-        assert_eq!(report.timing.host_noise_reruns, 0, "{name}");
+        assert_eq!(report.timing.host_interference_reruns, 0, "{name}");
         let steps = read_table(&out.path().join("steps.parquet"));
         let [host, counted, cpu] = ["host_time_ns", "computation_time_ns", "cpu_time_ns"]
             .map(|name| seconds(&steps, name));
@@ -356,13 +356,13 @@ fn missing_cgroup_yields_no_host_interference() {
     let out = tempfile::tempdir().unwrap();
     let report = run_shard(
         &spec(HIT, 0..1),
-        &Agent::with(SLEEPS).bundle,
-        &with_reruns(unconfined(), 2, 100),
+        &Agent::with_hooks(SLEEPING_HOOKS).bundle,
+        &with_reruns(unconfined_environment(), 2, 100),
         out.path(),
         &mut RecordingObserver::default(),
     )
     .unwrap();
-    assert_eq!(report.timing.longest_stall_s, 0.0);
+    assert_eq!(report.timing.max_host_interference_s, 0.0);
     let steps = read_table(&out.path().join("steps.parquet"));
     assert!(
         seconds(&steps, "host_time_ns")
@@ -406,11 +406,11 @@ impl Drop for BusyLoops {
 fn other_load_on_the_agents_cpu_is_measured() {
     let out = tempfile::tempdir().unwrap();
     let cpu = *affinity::allowed_cpus().unwrap().last().unwrap();
-    let mut env = sandboxed();
+    let mut env = sandboxed_environment();
     env.agent_cpus = vec![cpu];
     // The agent gets only a part of the CPU, and each of its steps needs 0.1 s of CPU time.
     let busy_loops = BusyLoops::on(cpu);
-    let agent = Agent::with(
+    let agent = Agent::with_hooks(
         "def on_step(step, answer):\n    \
          until = time.thread_time() + 0.1\n    \
          while step in range(1, 6) and time.thread_time() < until: pass\n    \
@@ -456,7 +456,7 @@ const HELPERS: [(&str, &str); 4] = [
 fn waits_of_helpers_do_not_excuse_a_sleeping_agent() {
     let cpu = *affinity::allowed_cpus().unwrap().last().unwrap();
     for (name, body) in HELPERS {
-        let agent = Agent::with(&format!(
+        let agent = Agent::with_hooks(&format!(
             "def run_helper():\n        {body}\n\
              def on_hello(hello):\n    \
              for _ in range(8):\n        \
@@ -465,7 +465,7 @@ fn waits_of_helpers_do_not_excuse_a_sleeping_agent() {
              if step in range(1, 4): time.sleep(0.5)\n    \
              return json.dumps(answer)",
         ));
-        let mut env = with_reruns(sandboxed(), 2, 100);
+        let mut env = with_reruns(sandboxed_environment(), 2, 100);
         env.agent_cpus = vec![cpu];
         let out = tempfile::tempdir().unwrap();
         let busy_loops = BusyLoops::on(cpu);
@@ -473,7 +473,7 @@ fn waits_of_helpers_do_not_excuse_a_sleeping_agent() {
         drop(busy_loops);
         let report = report.unwrap();
         assert_eq!(report.outcomes[0].fault, None, "{name}: {}", report.log);
-        assert_eq!(report.timing.host_noise_reruns, 0, "{name}");
+        assert_eq!(report.timing.host_interference_reruns, 0, "{name}");
         let steps = read_table(&out.path().join("steps.parquet"));
         let [host, counted] =
             ["host_time_ns", "computation_time_ns"].map(|name| seconds(&steps, name));
@@ -495,7 +495,7 @@ fn noise_floor_is_measured_before_and_between_episodes() {
     let report = run(
         &spec(HIT, 0..2),
         &Agent::behaving(),
-        &sandboxed(),
+        &sandboxed_environment(),
         out.path(),
     )
     .unwrap();
@@ -509,7 +509,7 @@ fn noise_floor_is_measured_before_and_between_episodes() {
 #[test]
 fn cpu_time_without_a_sandbox_includes_children() {
     let out = tempfile::tempdir().unwrap();
-    let agent = Agent::with(
+    let agent = Agent::with_hooks(
         "import subprocess\n\
          BURN = 'import sys, time\\nwhile time.process_time() < 0.15: pass\\n'\\\n    \
          'print(1, flush=True)\\nsys.stdin.read()'\n\
@@ -520,7 +520,13 @@ fn cpu_time_without_a_sandbox_includes_children() {
          child.stdout.readline()\n    \
          return json.dumps(answer)",
     );
-    run(&spec(HIT, 0..1), &agent, &unconfined(), out.path()).unwrap();
+    run(
+        &spec(HIT, 0..1),
+        &agent,
+        &unconfined_environment(),
+        out.path(),
+    )
+    .unwrap();
     let steps = read_table(&out.path().join("steps.parquet"));
     let column = steps.column_by_name("cpu_time_ns").unwrap();
     assert_eq!(column.null_count(), 0);

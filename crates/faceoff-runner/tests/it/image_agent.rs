@@ -1,9 +1,9 @@
 //! An agent that is a container image, from the archive to the verdict.
 
 use crate::{
-    agents::sandboxed,
+    agents::sandboxed_environment,
     archives::write,
-    image_archives::{HOLDS_A_POSE, HOLDS_A_POSE_TOML, shell_agent},
+    image_archives::{POSE_HOLDING_MANIFEST, POSE_HOLDING_SCRIPT, shell_agent},
 };
 use faceoff_runner::{
     AgentEnvironment, ValidationFailure, ValidationReport, ValidationSpec,
@@ -13,10 +13,10 @@ use faceoff_runner::{
 use faceoff_sandbox::{Isolation, Layer};
 use faceoff_types::{AgentFaultKind, Seed};
 
-/// The report of the validation of [`HOLDS_A_POSE`].
+/// The report of the validation of [`POSE_HOLDING_SCRIPT`].
 fn report_in(env: &AgentEnvironment) -> ValidationReport {
     let dir = tempfile::tempdir().unwrap();
-    let image = shell_agent(HOLDS_A_POSE_TOML, HOLDS_A_POSE);
+    let image = shell_agent(POSE_HOLDING_MANIFEST, POSE_HOLDING_SCRIPT);
     let archive = write(dir.path(), "ours.tar.gz", &image.docker().gz());
     let limits = BundleLimits::default();
     let bundle = unpack(&archive, &dir.path().join("bundle"), &limits, &|| false).unwrap();
@@ -47,7 +47,7 @@ fn refusal(env: &AgentEnvironment) -> String {
 
 #[test]
 fn image_agent_gets_image_and_manifest_variables() {
-    let report = report_in(&sandboxed());
+    let report = report_in(&sandboxed_environment());
     assert_eq!(report.failure, None, "{}", report.log);
     // The agent prints $MODE, $PATH and $OWN at the end of each of three tasks.
     assert_eq!(report.log, "toml /opt/bin own\n".repeat(3));
@@ -55,7 +55,7 @@ fn image_agent_gets_image_and_manifest_variables() {
 
 #[test]
 fn unsupported_image_is_refused_with_a_reason() {
-    let mut forbidden = sandboxed();
+    let mut forbidden = sandboxed_environment();
     forbidden.images = false;
     let reason = refusal(&forbidden);
     assert_eq!(
@@ -68,7 +68,7 @@ fn unsupported_image_is_refused_with_a_reason() {
             disabled_layers: vec![Layer::Namespaces],
         },
     ] {
-        let mut unsupported = sandboxed();
+        let mut unsupported = sandboxed_environment();
         unsupported.isolation = isolation;
         let reason = refusal(&unsupported);
         assert!(reason.contains("runs in the sandbox only"), "{reason}");

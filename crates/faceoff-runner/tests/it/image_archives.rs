@@ -210,7 +210,7 @@ pub fn shell_agent(agent_toml: &str, script: &str) -> TestImage {
 }
 
 /// An agent that holds a pose, and prints its environment variables at the end.
-pub const HOLDS_A_POSE: &str = r#"#!/bin/sh
+pub const POSE_HOLDING_SCRIPT: &str = r#"#!/bin/sh
 number() { n=${line#*"\"$1\":"}; n=${n%%[,\}]*}; }
 while read -r line; do
     case $line in
@@ -223,5 +223,5 @@ done
 "#;
 
 /// Its `agent.toml`, which replaces one of the image's variables and adds one.
-pub const HOLDS_A_POSE_TOML: &str = "name = \"boxed\"\ncommand = [\"./agent.sh\"]\nruntime = \"image\"\n\
+pub const POSE_HOLDING_MANIFEST: &str = "name = \"boxed\"\ncommand = [\"./agent.sh\"]\nruntime = \"image\"\n\
                                      interpolation = 3\n[env]\nMODE = \"toml\"\nOWN = \"own\"\n";

@@ -3,7 +3,7 @@
 //! counters.
 
 use crate::{
-    agents::{Agent, assert_timed_out, sandboxed},
+    agents::{Agent, assert_timed_out, sandboxed_environment},
     shard::{RecordingObserver, spec},
 };
 use faceoff_airhockey::HIT;
@@ -48,9 +48,10 @@ fn run_validation(
 
 #[test]
 fn validation_mean_excludes_host_interference() {
-    let agent =
-        Agent::with("def on_step(step, answer): time.sleep(0.012); return json.dumps(answer)");
-    let mut env = sandboxed();
+    let agent = Agent::with_hooks(
+        "def on_step(step, answer): time.sleep(0.012); return json.dumps(answer)",
+    );
+    let mut env = sandboxed_environment();
     env.time.mean_s = 0.006;
     let report = run_validation(&agent, &env, &NEARLY_ALL_INTERFERENCE).unwrap();
     assert_eq!(report.failure, None);
@@ -70,12 +71,13 @@ fn validation_mean_excludes_host_interference() {
 
 #[test]
 fn validation_timeout_by_the_host_is_a_platform_fault() {
-    let agent =
-        Agent::with("def on_step(step, answer): return None if step == 3 else json.dumps(answer)");
-    let mut env = sandboxed();
+    let agent = Agent::with_hooks(
+        "def on_step(step, answer): return None if step == 3 else json.dumps(answer)",
+    );
+    let mut env = sandboxed_environment();
     env.time.step_s = 0.1;
     for reruns in [0, 2] {
-        env.time.host_noise_reruns = reruns;
+        env.time.host_interference_reruns = reruns;
         let result = run_validation(&agent, &env, &NEARLY_ALL_INTERFERENCE);
         assert!(
             matches!(result, Err(PlatformFault::HostBusy(_))),
@@ -105,8 +107,8 @@ fn validation_timeout_by_the_host_is_a_platform_fault() {
 
 #[test]
 fn start_up_limit_excludes_host_interference() {
-    let agent = Agent::with("def on_hello(hello): time.sleep(1.0)");
-    let mut env = sandboxed();
+    let agent = Agent::with_hooks("def on_hello(hello): time.sleep(1.0)");
+    let mut env = sandboxed_environment();
     env.time.startup_s = 0.5;
     let report = run_validation(&agent, &env, &NO_INTERFERENCE).unwrap();
     let Some(ValidationFailure::Fault {
@@ -119,7 +121,7 @@ fn start_up_limit_excludes_host_interference() {
     assert_timed_out(&fault.fault, Phase::StartUp);
     // The agent never starts; as long as the monitor blames the host, it is a platform fault.
     let result = run_validation(
-        &Agent::with("def on_hello(hello): time.sleep(10_000)"),
+        &Agent::with_hooks("def on_hello(hello): time.sleep(10_000)"),
         &env,
         &NEARLY_ALL_INTERFERENCE,
     );
@@ -132,8 +134,8 @@ fn start_up_limit_excludes_host_interference() {
 #[test]
 fn reset_budget_excludes_host_interference() {
     let out = tempfile::tempdir().unwrap();
-    let agent = Agent::with("def on_reset(episode): time.sleep(0.4)");
-    let mut env = sandboxed();
+    let agent = Agent::with_hooks("def on_reset(episode): time.sleep(0.4)");
+    let mut env = sandboxed_environment();
     (env.time.resets_extra_s, env.time.reset_mean_s) = (0.5, 1e-9);
     let play = |monitor| {
         let spec = spec(HIT, 0..3);

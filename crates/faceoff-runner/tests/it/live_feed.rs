@@ -1,7 +1,7 @@
 //! Tests of the live feed of a game: its events, and positions at intervals.
 
 use crate::{
-    agents::{Agent, sandboxed},
+    agents::{Agent, sandboxed_environment},
     game::spec,
 };
 use faceoff_runner::{GameReport, LiveFeed, LiveFeedSink, run_game};
@@ -27,14 +27,14 @@ impl LiveFeedSink for RecordingSink {
 
 /// Runs a game in which the second agent crashes at its fourth step of each rally.
 fn run_with_feed(steps: u32, position_interval: Duration) -> (RecordingSink, GameReport) {
-    let crashing = Agent::with(
+    let crashing = Agent::with_hooks(
         "def on_step(step, answer):\n    \
          if step == 3: os._exit(3)\n    \
          return json.dumps(answer)",
     );
     let behaving = Agent::behaving();
     let out = tempfile::tempdir().unwrap();
-    let env = sandboxed();
+    let env = sandboxed_environment();
     let mut sink = RecordingSink::default();
     let mut feed = LiveFeed::new(&mut sink, position_interval);
     let bundles = [&behaving.bundle, &crashing.bundle];

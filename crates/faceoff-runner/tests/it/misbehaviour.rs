@@ -1,6 +1,6 @@
 //! Misbehaving agents in a validation: each misbehaviour is an agent fault of its own kind.
 
-use crate::agents::{Agent, sandboxed, with_short_step_limit};
+use crate::agents::{Agent, sandboxed_environment, short_step_limit_environment};
 use faceoff_airhockey::{DEFEND, HIT, TASKS};
 use faceoff_runner::{
     AgentEnvironment, PlatformFault, VALIDATION_STEPS, ValidationFailure, ValidationReport,
@@ -46,12 +46,12 @@ fn fault(report: &ValidationReport) -> AgentFault {
 
 /// The same for an agent with these hooks, in the usual sandbox.
 fn validation_fault(hooks: &str) -> (AgentFaultKind, ValidationReport) {
-    validation_fault_in(&Agent::with(hooks), &sandboxed())
+    validation_fault_in(&Agent::with_hooks(hooks), &sandboxed_environment())
 }
 
 #[test]
 fn behaving_agent_passes_the_validation() {
-    let report = report_in(&Agent::behaving(), &sandboxed());
+    let report = report_in(&Agent::behaving(), &sandboxed_environment());
     assert_eq!(report.failure, None);
     assert_eq!(report.log, "goodbye\n".repeat(3));
     for (timing, task) in report.timing.iter().zip(TASKS) {
@@ -67,14 +67,20 @@ fn behaving_agent_passes_the_validation() {
 
 #[test]
 fn validation_length_and_episodes_depend_on_the_seed() {
-    let agent = Agent::with(
+    let agent = Agent::with_hooks(
         "def on_reset(episode): print('reset', episode, file=sys.stderr)\n\
          def on_step(step, answer):\n    \
          if step == 0: print(answer['action'][0][0], file=sys.stderr)\n    \
          return json.dumps(answer)",
     );
     let run = |number| {
-        let report = validate(&spec(number), &agent.bundle, &sandboxed(), &|| false).unwrap();
+        let report = validate(
+            &spec(number),
+            &agent.bundle,
+            &sandboxed_environment(),
+            &|| false,
+        )
+        .unwrap();
         assert_eq!(report.failure, None, "{}", report.log);
         let steps: Vec<u32> = report.timing.iter().map(|timing| timing.steps).collect();
         (steps, report.log)
@@ -88,7 +94,7 @@ fn validation_length_and_episodes_depend_on_the_seed() {
 
 #[test]
 fn validation_plays_shards_of_the_stage() {
-    let agent = Agent::with(
+    let agent = Agent::with_hooks(
         "print('start', file=sys.stderr)\n\
          def on_reset(episode): print(episode, file=sys.stderr)",
     );
@@ -99,7 +105,7 @@ fn validation_plays_shards_of_the_stage() {
             episodes_per_shard: 2,
             ..spec(number)
         };
-        let report = validate(&spec, &agent.bundle, &sandboxed(), &|| false).unwrap();
+        let report = validate(&spec, &agent.bundle, &sandboxed_environment(), &|| false).unwrap();
         assert_eq!(report.failure, None, "{}", report.log);
         assert_eq!(report.timing.len(), 1);
         let lines = report.log.split_whitespace();
@@ -122,7 +128,7 @@ fn validation_plays_shards_of_the_stage() {
 #[test]
 fn slow_mean_answer_fails_the_validation() {
     // Every answer is within its own limit, and no machine is so fast that answers take no time.
-    let mut env = sandboxed();
+    let mut env = sandboxed_environment();
     env.time.mean_s = 1e-9;
     let report = report_in(&Agent::behaving(), &env);
     let Some(failure @ ValidationFailure::TooSlow { timing, .. }) = &report.failure else {
@@ -135,9 +141,10 @@ fn slow_mean_answer_fails_the_validation() {
 #[test]
 fn exceeded_time_budget_is_a_fault() {
     // Independent of other load: three answers cannot take less time.
-    let mut env = sandboxed();
+    let mut env = sandboxed_environment();
     env.time.episode_extra_s = 0.5;
-    let slow = Agent::with("def on_step(step, answer): time.sleep(0.3); return json.dumps(answer)");
+    let slow =
+        Agent::with_hooks("def on_step(step, answer): time.sleep(0.3); return json.dumps(answer)");
     let (kind, report) = validation_fault_in(&slow, &env);
     assert!(
         matches!(kind, AgentFaultKind::TimeBudget { phase: Phase::Step, used_s, limit_s }
@@ -147,9 +154,9 @@ fn exceeded_time_budget_is_a_fault() {
     let step = fault(&report).step.expect("the fault is in an episode");
     assert!((1..=2).contains(&step), "{step}");
 
-    let mut env = sandboxed();
+    let mut env = sandboxed_environment();
     (env.time.resets_extra_s, env.time.reset_mean_s) = (0.5, 1e-9);
-    let slow = Agent::with("def on_reset(episode): time.sleep(1.0)");
+    let slow = Agent::with_hooks("def on_reset(episode): time.sleep(1.0)");
     let (kind, report) = validation_fault_in(&slow, &env);
     assert!(
         matches!(
@@ -174,7 +181,7 @@ fn validation_stops_when_cancelled() {
     let stopped = validate(
         &spec(0),
         &Agent::behaving().bundle,
-        &sandboxed(),
+        &sandboxed_environment(),
         &stop_at_the_third_step,
     );
     assert!(matches!(stopped, Err(PlatformFault::Cancelled)));
@@ -182,7 +189,7 @@ fn validation_stops_when_cancelled() {
 }
 
 #[test]
-fn invalid_answer_is_quoted() {
+fn fault_quotes_an_invalid_answer() {
     let (kind, report) = validation_fault("def on_step(step, answer): return 'Traceback: x'");
     assert!(matches!(kind, AgentFaultKind::NotJson { .. }), "{kind:?}");
     let fault = fault(&report);
@@ -196,7 +203,7 @@ fn invalid_answer_is_quoted() {
 }
 
 #[test]
-fn printed_line_is_quoted() {
+fn fault_quotes_a_printed_line() {
     let (kind, report) = validation_fault("say('loading the model')");
     assert!(matches!(kind, AgentFaultKind::NotJson { .. }), "{kind:?}");
     let fault = fault(&report);
@@ -224,7 +231,7 @@ fn answer_before_the_question_is_a_fault() {
 }
 
 #[test]
-fn wrong_step_is_named() {
+fn fault_names_a_wrong_step() {
     let (kind, _) = validation_fault(
         "def on_step(step, answer): return json.dumps({**answer, 'step': step + 5})",
     );
@@ -238,7 +245,7 @@ fn wrong_step_is_named() {
 }
 
 #[test]
-fn wrong_shape_is_named() {
+fn fault_names_a_wrong_shape() {
     let (kind, _) = validation_fault(
         "def on_step(step, answer): return json.dumps({**answer, 'action': [[0] * 6] * 2})",
     );
@@ -252,7 +259,7 @@ fn wrong_shape_is_named() {
 }
 
 #[test]
-fn nan_is_not_finite() {
+fn nan_in_an_action_is_an_agent_fault() {
     let (kind, _) = validation_fault(
         "def on_step(step, answer): return json.dumps({**answer, 'action': [[float('nan')] * 7] * 2})",
     );
@@ -260,7 +267,7 @@ fn nan_is_not_finite() {
 }
 
 #[test]
-fn too_large_number_is_named() {
+fn fault_names_a_too_large_number() {
     let (kind, report) = validation_fault(
         "def on_step(step, answer):\n    \
          answer['action'][1][2] = 1.7e308\n    return json.dumps(answer)",
@@ -278,8 +285,8 @@ fn too_large_number_is_named() {
 
 #[test]
 fn silence_times_out() {
-    let agent = Agent::with("def on_step(step, answer): return None");
-    let (kind, report) = validation_fault_in(&agent, &with_short_step_limit());
+    let agent = Agent::with_hooks("def on_step(step, answer): return None");
+    let (kind, report) = validation_fault_in(&agent, &short_step_limit_environment());
     assert_eq!(
         kind,
         AgentFaultKind::TimedOut {
@@ -292,10 +299,10 @@ fn silence_times_out() {
 
 #[test]
 fn line_without_newline_times_out() {
-    let agent = Agent::with(
+    let agent = Agent::with_hooks(
         "def on_step(step, answer):\n    sys.stdout.write(json.dumps(answer)); sys.stdout.flush()",
     );
-    let (kind, _) = validation_fault_in(&agent, &with_short_step_limit());
+    let (kind, _) = validation_fault_in(&agent, &short_step_limit_environment());
     assert_eq!(
         kind,
         AgentFaultKind::TimedOut {
@@ -321,8 +328,8 @@ fn endless_line_is_too_long() {
 
 #[test]
 fn closed_output_is_a_fault() {
-    let agent = Agent::with("def on_step(step, answer):\n    os.close(1); time.sleep(3600)");
-    let mut env = sandboxed();
+    let agent = Agent::with_hooks("def on_step(step, answer):\n    os.close(1); time.sleep(3600)");
+    let mut env = sandboxed_environment();
     // The agent never exits, so a short wait for its exit is enough.
     env.time.bye_s = 0.5;
     let (kind, _) = validation_fault_in(&agent, &env);
@@ -344,7 +351,7 @@ fn exits_and_signals_are_distinguished() {
 }
 
 #[test]
-fn wrong_ready_is_named() {
+fn fault_names_a_wrong_ready_message() {
     for (hooks, expected_got) in [
         ("INTERPOLATION = 9", "ready with interpolation 9"),
         (
@@ -359,7 +366,7 @@ fn wrong_ready_is_named() {
         assert_eq!(got, expected_got);
     }
     let agent = Agent::behaving().manifest(|manifest| manifest.interpolation = Some(5));
-    let (kind, _) = validation_fault_in(&agent, &sandboxed());
+    let (kind, _) = validation_fault_in(&agent, &sandboxed_environment());
     let AgentFaultKind::WrongMessage { expected, got } = kind else {
         panic!("{kind:?}")
     };
@@ -405,13 +412,13 @@ fn fork_bomb_ends_in_an_agent_fault() {
 fn unstartable_command_or_runtime_is_named() {
     let missing =
         Agent::behaving().manifest(|manifest| manifest.command = vec!["./no-such-program".into()]);
-    let (kind, _) = validation_fault_in(&missing, &sandboxed());
+    let (kind, _) = validation_fault_in(&missing, &sandboxed_environment());
     assert!(
         matches!(&kind, AgentFaultKind::CannotStart { detail } if detail.contains("no-such-program")),
         "{kind:?}"
     );
     let runtime = Agent::behaving().manifest(|manifest| manifest.runtime = "matlab".into());
-    let (kind, _) = validation_fault_in(&runtime, &sandboxed());
+    let (kind, _) = validation_fault_in(&runtime, &sandboxed_environment());
     let AgentFaultKind::CannotStart { detail } = kind else {
         panic!("{kind:?}")
     };

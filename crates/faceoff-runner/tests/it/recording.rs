@@ -1,7 +1,7 @@
 //! Recordings of shards: every recorded number equals that of a new simulation from the seed and the recorded actions.
 
 use crate::{
-    agents::{Agent, sandboxed},
+    agents::{Agent, sandboxed_environment},
     shard::{run, spec},
 };
 use arrow_array::{
@@ -63,7 +63,7 @@ pub fn texts<'a>(batch: &'a RecordBatch, name: &str) -> &'a StringArray {
 
 /// An agent that moves, so that every column changes.
 pub fn moving_agent() -> Agent {
-    Agent::with(
+    Agent::with_hooks(
         "def on_step(step, answer):\n    \
          q = [x + 0.002 * (step % 7) for x in answer['action'][0]]\n    \
          return json.dumps({**answer, 'action': [q, [0.1] * 7]})",
@@ -77,7 +77,7 @@ fn recording_matches_the_simulation() {
     for task in TASKS {
         let spec = spec(task, 4..6);
         let dir = out.path().join(task.as_str());
-        let report = run(&spec, &moving_agent(), &sandboxed(), &dir).unwrap();
+        let report = run(&spec, &moving_agent(), &sandboxed_environment(), &dir).unwrap();
         let steps = read_table(&dir.join("steps.parquet"));
         let episodes = read_table(&dir.join("episodes.parquet"));
         let played: u32 = report.outcomes.iter().map(|outcome| outcome.steps).sum();
@@ -227,9 +227,16 @@ fn compare_state(batch: &RecordBatch, prefix: &str, row: usize, world: &Episode)
 #[test]
 fn times_and_faults_are_recorded() {
     let out = tempfile::tempdir().unwrap();
-    let agent =
-        Agent::with("def on_step(step, answer): return 'no' if step == 3 else json.dumps(answer)");
-    let report = run(&spec(HIT, 0..1), &agent, &sandboxed(), out.path()).unwrap();
+    let agent = Agent::with_hooks(
+        "def on_step(step, answer): return 'no' if step == 3 else json.dumps(answer)",
+    );
+    let report = run(
+        &spec(HIT, 0..1),
+        &agent,
+        &sandboxed_environment(),
+        out.path(),
+    )
+    .unwrap();
     let steps = read_table(&out.path().join("steps.parquet"));
     assert_eq!(
         steps.num_rows(),

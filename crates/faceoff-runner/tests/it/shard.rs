@@ -1,6 +1,6 @@
 //! Shards: ranges of episodes of one task, played by one agent, with their outcomes, faults and logs.
 
-use crate::agents::{Agent, sandboxed};
+use crate::agents::{Agent, sandboxed_environment};
 use faceoff_airhockey::{DEFEND, EVALUATION, HIT, PREPARE};
 use faceoff_runner::{
     AgentEnvironment, Observer, PlatformFault, ShardReport, ShardSpec, run_shard,
@@ -79,9 +79,9 @@ pub fn without_times(outcomes: &[EpisodeOutcome]) -> Vec<EpisodeOutcome> {
 fn agent_plays_all_tasks_with_its_interpolation() {
     let out = tempfile::tempdir().unwrap();
     for (task, hooks) in [(HIT, ""), (DEFEND, "INTERPOLATION = 1"), (PREPARE, "")] {
-        let agent = Agent::with(hooks);
+        let agent = Agent::with_hooks(hooks);
         let dir = out.path().join(task.as_str());
-        let report = run(&spec(task, 0..2), &agent, &sandboxed(), &dir).unwrap();
+        let report = run(&spec(task, 0..2), &agent, &sandboxed_environment(), &dir).unwrap();
         assert!(!report.stopped_by_faults);
         assert_eq!(
             report
@@ -105,7 +105,7 @@ fn agent_plays_all_tasks_with_its_interpolation() {
 fn results_do_not_depend_on_the_division_into_shards() {
     let out = tempfile::tempdir().unwrap();
     let agent = Agent::behaving();
-    let env = sandboxed();
+    let env = sandboxed_environment();
     let whole = run(&spec(DEFEND, 0..5), &agent, &env, &out.path().join("whole")).unwrap();
     let mut parts = Vec::new();
     for range in [3..5, 0..1, 1..3] {
@@ -123,14 +123,20 @@ fn results_do_not_depend_on_the_division_into_shards() {
 #[test]
 fn fault_ends_its_episode_and_restarts_the_agent() {
     let out = tempfile::tempdir().unwrap();
-    let agent = Agent::with(
+    let agent = Agent::with_hooks(
         "count = 0\n\
          def on_reset(episode):\n    global count; count += 1; print('reset', episode, count, file=sys.stderr)\n    \
          global now; now = episode\n\
          def on_step(step, answer):\n    \
          return 'oops' if (now, step) == (1, 2) else json.dumps(answer)",
     );
-    let report = run(&spec(PREPARE, 0..3), &agent, &sandboxed(), out.path()).unwrap();
+    let report = run(
+        &spec(PREPARE, 0..3),
+        &agent,
+        &sandboxed_environment(),
+        out.path(),
+    )
+    .unwrap();
     let [first, second, third] = &report.outcomes[..] else {
         panic!("three episodes: {report:?}");
     };
@@ -164,7 +170,7 @@ fn fault_ends_its_episode_and_restarts_the_agent() {
     let undisturbed = run(
         &spec(PREPARE, 2..3),
         &Agent::behaving(),
-        &sandboxed(),
+        &sandboxed_environment(),
         &out.path().join("undisturbed"),
     );
     assert_eq!(
@@ -176,8 +182,14 @@ fn fault_ends_its_episode_and_restarts_the_agent() {
 #[test]
 fn too_many_faults_stop_the_shard() {
     let out = tempfile::tempdir().unwrap();
-    let agent = Agent::with("def on_step(step, answer): sys.exit(3)");
-    let report = run(&spec(HIT, 0..9), &agent, &sandboxed(), out.path()).unwrap();
+    let agent = Agent::with_hooks("def on_step(step, answer): sys.exit(3)");
+    let report = run(
+        &spec(HIT, 0..9),
+        &agent,
+        &sandboxed_environment(),
+        out.path(),
+    )
+    .unwrap();
     assert!(report.stopped_by_faults);
     assert_eq!(
         report.outcomes.len(),
@@ -194,7 +206,13 @@ fn too_many_faults_stop_the_shard() {
 fn failed_start_is_a_fault_without_an_episode() {
     let out = tempfile::tempdir().unwrap();
     let agent = Agent::script("import sys\nsys.exit('no model')");
-    let report = run(&spec(HIT, 0..1), &agent, &sandboxed(), out.path()).unwrap();
+    let report = run(
+        &spec(HIT, 0..1),
+        &agent,
+        &sandboxed_environment(),
+        out.path(),
+    )
+    .unwrap();
     let fault = report.outcomes[0].fault.as_ref().unwrap();
     assert_eq!(fault.fault, AgentFaultKind::Exited { code: 1 });
     assert_eq!((fault.episode, fault.step), (None, None));
@@ -205,7 +223,7 @@ fn failed_start_is_a_fault_without_an_episode() {
 #[test]
 fn cancelled_shard_leaves_no_recording() {
     let out = tempfile::tempdir().unwrap();
-    let agent = Agent::with("print('started', file=sys.stderr)");
+    let agent = Agent::with_hooks("print('started', file=sys.stderr)");
     let mut observer = RecordingObserver {
         stop_after: Some(1),
         ..RecordingObserver::default()
@@ -214,7 +232,7 @@ fn cancelled_shard_leaves_no_recording() {
     let result = run_shard(
         &spec(DEFEND, 0..3),
         &agent.bundle,
-        &sandboxed(),
+        &sandboxed_environment(),
         &dir,
         &mut observer,
     );
@@ -226,7 +244,7 @@ fn cancelled_shard_leaves_no_recording() {
     assert_eq!(observer.logs, ["started\n"]);
     assert!(!dir.join("shard.json").exists());
     // The same folder can be used again.
-    run(&spec(DEFEND, 0..1), &agent, &sandboxed(), &dir).unwrap();
+    run(&spec(DEFEND, 0..1), &agent, &sandboxed_environment(), &dir).unwrap();
     let mut names: Vec<_> = dir
         .read_dir()
         .unwrap()

@@ -2,7 +2,7 @@
 //! death.
 
 use crate::{
-    agents::{Agent, assert_timed_out, sandboxed},
+    agents::{Agent, assert_timed_out, sandboxed_environment},
     shard::{RecordingObserver, spec},
 };
 use faceoff_airhockey::HIT;
@@ -24,7 +24,7 @@ use std::{
 /// An agent that does not answer its second step. It sets its process name, so that the test can find it.
 fn silent_agent(name: &str) -> Agent {
     const PR_SET_NAME: u32 = 15;
-    Agent::with(&format!(
+    Agent::with_hooks(&format!(
         "import ctypes\n\
          def on_step(step, answer):\n    \
          if step == 1:\n        \
@@ -59,8 +59,8 @@ impl InterferenceMonitor for BlockedByAgent {
     }
 }
 
-fn with_short_limits(supervision: Supervision) -> AgentEnvironment {
-    let mut env = sandboxed();
+fn short_limits_environment(supervision: Supervision) -> AgentEnvironment {
+    let mut env = sandboxed_environment();
     env.time.step_s = 0.2;
     env.time.bye_s = 0.1;
     env.supervision = supervision.with_slack(Duration::from_millis(100));
@@ -77,7 +77,7 @@ fn agent_that_blocks_its_evaluator_is_killed_and_blamed() {
     let report = run_shard_monitored(
         &spec,
         &agent.bundle,
-        &with_short_limits(Supervision::default()),
+        &short_limits_environment(Supervision::default()),
         out.path(),
         &mut RecordingObserver::default(),
         &BlockedByAgent(NAME),
@@ -97,7 +97,7 @@ fn cancelled_job_does_not_wait_for_its_agent() {
     let agent = silent_agent(NAME);
     let out = tempfile::tempdir().unwrap();
     let cancelled = Arc::new(AtomicBool::new(false));
-    let mut env = sandboxed();
+    let mut env = sandboxed_environment();
     // This limit is never reached.
     env.time.step_s = 3600.0;
     env.supervision = Supervision::new({

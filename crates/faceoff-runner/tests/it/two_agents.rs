@@ -1,6 +1,8 @@
 //! Two agents with one evaluator, like the two sides of a game.
 
-use crate::agents::{Agent, sandboxed, unconfined, with_short_step_limit};
+use crate::agents::{
+    Agent, sandboxed_environment, short_step_limit_environment, unconfined_environment,
+};
 use faceoff_episode::AnswerTiming;
 use faceoff_runner::{AgentEnvironment, Session, SessionError};
 use faceoff_types::{AgentFaultKind, AgentTask, Phase, Side};
@@ -41,7 +43,7 @@ fn both_sides_are_asked_before_waiting() {
     }
     // Each agent writes to its own pipe and reads from that of the other.
     let agents = [[0, 1], [1, 0]].map(|[own, other]| {
-        Agent::with(&format!(
+        Agent::with_hooks(&format!(
             "own, other = os.open({:?}, os.O_RDWR), os.open({:?}, os.O_RDWR)\n\
              def meet(): os.write(own, b'.'); os.read(other, 1)\n\
              def on_hello(hello): print(hello['task'], hello['agent_id'], file=sys.stderr)\n\
@@ -50,7 +52,7 @@ fn both_sides_are_asked_before_waiting() {
             pipes[own], pipes[other]
         ))
     });
-    let mut sessions = [0, 1].map(|i| start(&agents[i], &unconfined(), SIDES[i]));
+    let mut sessions = [0, 1].map(|i| start(&agents[i], &unconfined_environment(), SIDES[i]));
     for session in &mut sessions {
         session.send_reset(0).unwrap();
     }
@@ -77,19 +79,19 @@ fn both_sides_are_asked_before_waiting() {
 /// One agent does not answer. The other closes its output and does not exit; its sandbox still has the output open.
 #[test]
 fn sides_get_separate_verdicts() {
-    let mut short_exit_grace = sandboxed();
+    let mut short_exit_grace = sandboxed_environment();
     short_exit_grace.time.bye_s = 0.5;
     let agents = [
         (
             "def on_step(step, answer): return None",
-            with_short_step_limit(),
+            short_step_limit_environment(),
         ),
         (
             "def on_step(step, answer):\n    os.close(1); time.sleep(3600)",
             short_exit_grace,
         ),
     ]
-    .map(|(hooks, env)| (Agent::with(hooks), env));
+    .map(|(hooks, env)| (Agent::with_hooks(hooks), env));
     let mut sessions = [0, 1].map(|i| start(&agents[i].0, &agents[i].1, SIDES[i]));
     for session in &mut sessions {
         session.reset(0).unwrap();

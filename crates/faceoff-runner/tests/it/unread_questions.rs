@@ -2,7 +2,7 @@
 //! time.
 
 use crate::{
-    agents::{Agent, sandboxed, unconfined},
+    agents::{Agent, sandboxed_environment, unconfined_environment},
     recording::{read_table, seconds},
     shard::{run, spec},
 };
@@ -14,7 +14,7 @@ use std::path::Path;
 /// time: with MODE `sleeps` by sleeping, with `computes` by computing. It writes `used time` to its log, and reads all
 /// questions. With MODE `answers` it answers instead of reading. With MODE `reads slowly` it reads the first questions in a
 /// thread, a byte each millisecond.
-const LEAVES_UNREAD: &str = r#"
+const UNREAD_QUESTIONS_SCRIPT: &str = r#"
 import array, fcntl, json, os, sys, termios, threading, time
 SLOW_READS = 6
 
@@ -101,9 +101,9 @@ while True:
     message = None
 "#;
 
-/// An agent with [`LEAVES_UNREAD`] and this MODE.
+/// An agent with [`UNREAD_QUESTIONS_SCRIPT`] and this MODE.
 fn leaves_unread(mode: &str) -> Agent {
-    Agent::script(&format!("MODE = {mode:?}\n{LEAVES_UNREAD}"))
+    Agent::script(&format!("MODE = {mode:?}\n{UNREAD_QUESTIONS_SCRIPT}"))
 }
 
 /// Number of recorded answers that took 0.3 s or more, including host interference.
@@ -122,9 +122,9 @@ fn slow_answers(recording: &Path) -> usize {
 #[test]
 fn question_that_does_not_fit_costs_the_agents_time() {
     for (env, mode) in [
-        (sandboxed(), "computes"),
-        (sandboxed(), "sleeps"),
-        (unconfined(), "computes"),
+        (sandboxed_environment(), "computes"),
+        (sandboxed_environment(), "sleeps"),
+        (unconfined_environment(), "computes"),
     ] {
         let out = tempfile::tempdir().unwrap();
         let agent = leaves_unread(mode);
@@ -140,7 +140,7 @@ fn question_that_does_not_fit_costs_the_agents_time() {
 #[test]
 fn agent_cannot_shrink_its_channel() {
     let out = tempfile::tempdir().unwrap();
-    let shrinks = Agent::with(
+    let shrinks = Agent::with_hooks(
         "import fcntl\n\
          def on_hello(hello):\n    \
          for fd in range(2):\n        \
@@ -148,7 +148,7 @@ fn agent_cannot_shrink_its_channel() {
          try: fcntl.fcntl(fd, F_SETPIPE_SZ, 4096)\n        \
          except OSError as error: print('refused', error.errno, file=sys.stderr)",
     );
-    for env in [sandboxed(), unconfined()] {
+    for env in [sandboxed_environment(), unconfined_environment()] {
         let report = run(&spec(HIT, 0..1), &shrinks, &env, out.path()).unwrap();
         assert_eq!(report.outcomes[0].fault, None);
         assert_eq!(report.log.matches("refused").count(), 2, "{}", report.log);
@@ -159,7 +159,13 @@ fn agent_cannot_shrink_its_channel() {
 fn slow_read_of_a_question_costs_the_agents_time() {
     let out = tempfile::tempdir().unwrap();
     let agent = leaves_unread("reads slowly");
-    let report = run(&spec(HIT, 0..1), &agent, &sandboxed(), out.path()).unwrap();
+    let report = run(
+        &spec(HIT, 0..1),
+        &agent,
+        &sandboxed_environment(),
+        out.path(),
+    )
+    .unwrap();
     assert_eq!(report.outcomes[0].fault, None, "{}", report.log);
     assert_eq!(report.log.matches("used time").count(), 6);
     // The agent takes a millisecond for each of the few hundred bytes of a question.
@@ -170,7 +176,13 @@ fn slow_read_of_a_question_costs_the_agents_time() {
 fn answer_before_reading_the_question_is_a_fault() {
     let out = tempfile::tempdir().unwrap();
     let agent = leaves_unread("answers");
-    let report = run(&spec(PREPARE, 0..1), &agent, &sandboxed(), out.path()).unwrap();
+    let report = run(
+        &spec(PREPARE, 0..1),
+        &agent,
+        &sandboxed_environment(),
+        out.path(),
+    )
+    .unwrap();
     let fault = &report.outcomes[0].fault.as_ref().unwrap();
     assert!(
         matches!(&fault.fault, AgentFaultKind::WrongMessage { got, .. } if got.contains("not asked for")),

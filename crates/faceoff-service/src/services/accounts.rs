@@ -3,8 +3,8 @@
 
 use crate::{app::AppState, boxed, network::Network, problem::Problem, text};
 use faceoff_api::{
-    pasted::InvitationLink,
     requests::{self, FoundedTeam, InvitedRole},
+    secret_extraction::InvitationLink,
     token::{Secret, SecretKind, hash_token},
 };
 use faceoff_store::{JoinOutcome, JoinRequest, TeamProfile, TokenKind};

@@ -9,7 +9,7 @@ use crate::{
     viewer::Viewer,
     views::clip_file::{ClipFile, Episode},
 };
-use faceoff_replay::{EpisodeLine, Pack};
+use faceoff_replay::{EpisodeIndexEntry, Pack};
 use faceoff_store::Artifacts;
 use faceoff_types::{AblationId, Profile, ProfileMap, SubmissionId, Task};
 
@@ -26,14 +26,14 @@ pub struct AblationClips {
 #[derive(Debug, Clone, PartialEq)]
 pub struct DifferingEpisode {
     /// The outcome in the ideal simulator.
-    pub ideal: EpisodeLine,
+    pub ideal: EpisodeIndexEntry,
     /// The outcome under the perturbation.
-    pub perturbed: EpisodeLine,
+    pub perturbed: EpisodeIndexEntry,
 }
 
 impl DifferingEpisode {
     /// Both outcomes, the ideal one first.
-    pub fn both(&self) -> [&EpisodeLine; 2] {
+    pub fn both(&self) -> [&EpisodeIndexEntry; 2] {
         [&self.ideal, &self.perturbed]
     }
 }

@@ -10,9 +10,9 @@ pub fn view(attempt: GameAttempt) -> GameAttemptView {
     let end = attempt.end.as_ref().map(|end| match end.outcome {
         AttemptOutcome::Played => AttemptOutcomeView::Played,
         AttemptOutcome::PlatformFailed => AttemptOutcomeView::PlatformFailed,
-        AttemptOutcome::Released => AttemptOutcomeView::GivenBack,
+        AttemptOutcome::Released => AttemptOutcomeView::Released,
         AttemptOutcome::Lost => AttemptOutcomeView::Lost,
-        AttemptOutcome::Cancelled => AttemptOutcomeView::CalledOff,
+        AttemptOutcome::Cancelled => AttemptOutcomeView::Cancelled,
     });
     GameAttemptView {
         number: attempt.number,

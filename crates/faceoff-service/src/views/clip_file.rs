@@ -2,14 +2,14 @@
 //! observations and actions. A clip file holds the clips of many episodes, or of a game, and is stored as an artifact.
 
 use crate::{app::AppState, boxed, problem::Problem};
-use faceoff_replay::{Clip, ClipKey, EpisodeLine, Pack, ReplayError};
+use faceoff_replay::{Clip, ClipKey, EpisodeIndexEntry, Pack, ReplayError};
 use faceoff_types::Task;
 use std::path::PathBuf;
 
 /// An episode, as far as the viewer may see it.
 pub struct Episode {
     /// The summary of the episode, from the clip index.
-    pub summary: EpisodeLine,
+    pub summary: EpisodeIndexEntry,
     /// Whether the file also has the task's previous episode.
     pub has_previous: bool,
     /// Whether the file also has the task's next episode.

@@ -12,7 +12,7 @@ use crate::{
     },
 };
 use faceoff_api::views::clips::{EpisodesView, TimeBinView};
-use faceoff_replay::{ClipIndex, ClipKey, EpisodeLine, Pack};
+use faceoff_replay::{ClipIndex, ClipKey, EpisodeIndexEntry, Pack};
 use faceoff_store::{Artifacts, Evaluation, EvaluationState};
 use faceoff_types::{EvaluationId, Task, TaskMap};
 
@@ -113,7 +113,7 @@ impl Clips {
             ..
         } = self.file.read(Pack::clip_index).await?;
         if !self.can_see_observations {
-            episodes.iter_mut().for_each(EpisodeLine::make_public);
+            episodes.iter_mut().for_each(EpisodeIndexEntry::make_public);
         }
         let bins = |(task, times): (Task, faceoff_replay::TimeBins)| {
             let bins = times

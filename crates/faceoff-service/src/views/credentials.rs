@@ -20,7 +20,7 @@ pub fn ended(ended: EndedCredentials, now: Timestamp) -> Option<EndedCredentials
         webhooks: webhooks
             .map(|webhook| webhook::view(webhook, now))
             .collect(),
-        remaining_people: ended.remaining_users.into_iter().map(user::view).collect(),
-        restored_people: ended.restored_users.into_iter().map(user::view).collect(),
+        remaining_users: ended.remaining_users.into_iter().map(user::view).collect(),
+        restored_users: ended.restored_users.into_iter().map(user::view).collect(),
     })
 }

@@ -8,7 +8,7 @@ use crate::{
     views::{clips::Clips, visibility::Visibility},
 };
 use faceoff_api::views::board::BoardRow;
-use faceoff_replay::{Clip, ClipKey, EpisodeLine, Pack, ReplayError};
+use faceoff_replay::{Clip, ClipKey, EpisodeIndexEntry, Pack, ReplayError};
 use faceoff_types::{Competition, EvaluationId};
 use jiff::civil::Date;
 use std::{cmp::Reverse, sync::Arc};
@@ -79,7 +79,7 @@ fn quickest_success(
         summaries
             .filter(move |summary| summary.task == task && summary.success && summary.has_clips())
     };
-    let quickest: Option<&EpisodeLine> = tasks.iter().find_map(|info| {
+    let quickest: Option<&EpisodeIndexEntry> = tasks.iter().find_map(|info| {
         successes(info.task).min_by_key(|summary| (summary.steps, summary.episode))
     });
     let Some(summary) = quickest else {

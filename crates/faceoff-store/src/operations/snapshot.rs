@@ -41,7 +41,7 @@ pub struct MissingSummaries {
     /// The current version of their format.
     pub version: u32,
     /// In JSON.
-    pub of_runs: Vec<(RunId, String)>,
+    pub json_by_run: Vec<(RunId, String)>,
 }
 
 impl Store {
@@ -83,7 +83,7 @@ impl Store {
             open_evaluations += evaluations::count_open_proposed(&mut connection, None).await?;
         }
         describe_archive(&mut connection, edition, program, now).await?;
-        for (run, summary) in &summaries.of_runs {
+        for (run, summary) in &summaries.json_by_run {
             episode_summaries::put(&mut connection, *run, summaries.version, summary).await?;
         }
         scrub(&mut connection, edition, summaries.version).await?;

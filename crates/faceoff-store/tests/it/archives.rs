@@ -122,7 +122,7 @@ async fn export(f: &TestStore, edition: Edition) -> tempfile::TempDir {
     let runs = f.store.unsummarised_runs(1).await.unwrap();
     let summaries = MissingSummaries {
         version: 1,
-        of_runs: runs.iter().map(|run| (*run, "{}".to_owned())).collect(),
+        json_by_run: runs.iter().map(|run| (*run, "{}".to_owned())).collect(),
     };
     let folder = tempfile::tempdir().unwrap();
     let snapshot = f

@@ -179,7 +179,7 @@ fn is_platform_fault(error: &VerifyError) -> bool {
         VerifyError::Dataset(DatasetError::Io(_))
         | VerifyError::Recording(RecordingError::Io(_) | RecordingError::FullDisk(_))
         | VerifyError::Job(_)
-        | VerifyError::Workers(_) => true,
+        | VerifyError::Threads(_) => true,
         VerifyError::Dataset(_) | VerifyError::Recording(_) | VerifyError::Differs(_) => false,
     }
 }

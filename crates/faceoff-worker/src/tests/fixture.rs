@@ -13,7 +13,7 @@ use crate::{
 use faceoff_airhockey::{IDEAL, TASKS};
 use faceoff_live::LiveState;
 use faceoff_metrics::Metrics;
-use faceoff_replay::{ClipIndex, ClipKey, EpisodeLine, PackWriter};
+use faceoff_replay::{ClipIndex, ClipKey, EpisodeIndexEntry, PackWriter};
 use faceoff_runner::{
     AgentEnvironment, AssembledDataset, CLIPS_FILE, EvaluationMeta, GameReport, GameSpec,
     LiveFeedSink, Observer, PlatformFault, ShardReport, ShardSpec, TimeLimits, ValidationReport,
@@ -130,15 +130,15 @@ fn clips(spec: &ShardSpec) -> Vec<u8> {
         let text = format!("{} {episode}", spec.profile);
         pack.add(ClipKey::motion(spec.task, episode), text.as_bytes())
             .unwrap();
-        index.episodes.push(EpisodeLine {
+        index.episodes.push(EpisodeIndexEntry {
             task: spec.task,
             episode,
             steps: 10,
             success: spec.profile == IDEAL || episode != 1,
             end: EpisodeEnd::HORIZON,
             end_description: text,
-            start: Some([0.0; 4]),
-            last: Some([0.0; 4]),
+            puck_at_start: Some([0.0; 4]),
+            puck_at_end: Some([0.0; 4]),
             violations: Vec::new(),
             longest_s: Some(0.001),
             late_answers: 0,
@@ -438,7 +438,7 @@ impl Server {
                         reset_s: 1.0,
                         step_s: 1.0,
                         bye_s: 1.0,
-                        host_noise_reruns: 0,
+                        host_interference_reruns: 0,
                         ..TimeLimits::default()
                     },
                     isolation: Isolation::None,

@@ -436,10 +436,10 @@ async fn ablation_plays_own_episodes_in_all_profiles() {
         for profile in ABLATION_PROFILES {
             let key = Artifacts::ablation_clips_key(ablation.id, profile);
             let pack = Pack::open(&artifacts.local_path(&key).unwrap()).unwrap();
-            let lines = pack.clip_index().unwrap().episodes;
-            let lines = lines.iter().map(|line| (line.task, line.episode));
+            let entries = pack.clip_index().unwrap().episodes;
+            let entries = entries.iter().map(|entry| (entry.task, entry.episode));
             let expected = TASKS.map(|task| (task, 1));
-            assert_eq!(lines.collect::<Vec<_>>(), expected, "{profile}");
+            assert_eq!(entries.collect::<Vec<_>>(), expected, "{profile}");
             for task in TASKS {
                 let clip = format!("{profile} 1").into_bytes();
                 assert_eq!(pack.clip(ClipKey::motion(task, 1)).unwrap(), Some(clip));

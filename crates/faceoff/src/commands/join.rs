@@ -8,8 +8,8 @@ use crate::{
 use anyhow::{Context, bail};
 use clap::Args;
 use faceoff_api::{
-    pasted::InvitationLink,
     requests::{FoundedTeam, JoinRequest},
+    secret_extraction::InvitationLink,
     views::user::CallerView,
 };
 use faceoff_types::{DivisionName, TeamName, UserName};

@@ -7,7 +7,7 @@ use crate::{
 };
 use anyhow::{Context, ensure};
 use clap::Args;
-use faceoff_api::{pasted::secret_in, requests::NewToken, views::user::CallerView};
+use faceoff_api::{requests::NewToken, secret_extraction::extract_secret, views::user::CallerView};
 use serde::Serialize;
 use std::{
     fs,
@@ -99,7 +99,7 @@ impl LoginCommand {
                 "use --token-stdin and pass the token as standard input, or --name NAME --password-stdin",
             )?,
         };
-        let token = secret_in(&token).to_owned();
+        let token = extract_secret(&token).to_owned();
         ensure!(
             !token.is_empty(),
             "expected a token, which begins with fo_; without one, accept an invitation (faceoff join LINK), or sign in with --name"

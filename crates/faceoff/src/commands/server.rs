@@ -7,7 +7,7 @@ use crate::{
     exit::NotSignedIn,
 };
 use clap::Args;
-use faceoff_api::pasted::secret_in;
+use faceoff_api::secret_extraction::extract_secret;
 use std::path::{Path, PathBuf};
 
 /// A server on this machine with the default configuration.
@@ -99,7 +99,7 @@ impl Connection {
             .or_else(|| login.as_ref()?.ca_file.clone());
         let (token, token_source) = match (token, login) {
             (Some((token, variable)), _) => (
-                Some(secret_in(token).to_owned()),
+                Some(extract_secret(token).to_owned()),
                 Source::of_value(token, variable),
             ),
             (None, Some(login)) => (Some(login.token), Source::Login),

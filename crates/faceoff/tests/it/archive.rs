@@ -512,7 +512,7 @@ async fn data_folder_of_an_earlier_version_can_be_archived() {
     let runs = store.unsummarised_runs(0).await.unwrap();
     let summaries = MissingSummaries {
         version: 0,
-        of_runs: runs.iter().map(|run| (*run, "{}".to_owned())).collect(),
+        json_by_run: runs.iter().map(|run| (*run, "{}".to_owned())).collect(),
     };
     for edition in [
         faceoff_store::Edition::Public,

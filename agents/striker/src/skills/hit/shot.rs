@@ -59,8 +59,8 @@ impl Aim {
         if self.rim_side == 0.0 {
             return Vec2::new(distance_x, self.y - from.y).normalize();
         }
-        let before = (field.puck_y() - self.rim_side * from.y).max(0.0);
-        let after = field.puck_y() - self.rim_side * self.y;
+        let before = (field.puck_y_max() - self.rim_side * from.y).max(0.0);
+        let after = field.puck_y_max() - self.rim_side * self.y;
         Vec2::new(
             distance_x,
             self.rim_side * (before + after / SLOPE_RESTITUTION),
@@ -181,10 +181,10 @@ fn chance_past_opponent(field: &Field, recent: &RecentPositions, struck: &Puck, 
     let (bounce_point, first_length) = if aim.rim_side == 0.0 {
         (from, 0.0)
     } else {
-        let before = (field.puck_y() - aim.rim_side * from.y).max(0.0);
-        let after = (field.puck_y() - aim.rim_side * aim.y) / SLOPE_RESTITUTION;
+        let before = (field.puck_y_max() - aim.rim_side * from.y).max(0.0);
+        let after = (field.puck_y_max() - aim.rim_side * aim.y) / SLOPE_RESTITUTION;
         let x = from.x + (field.half_length - from.x) * before / (before + after);
-        let bounce_point = Vec2::new(x, aim.rim_side * field.puck_y());
+        let bounce_point = Vec2::new(x, aim.rim_side * field.puck_y_max());
         (bounce_point, (bounce_point - from).norm())
     };
     let last_length = (goal - bounce_point).norm();

@@ -1,5 +1,5 @@
 //! Simulates strikes at a puck near the rim with the puck model, and gives each a value from 0, a failure, to 1, a *prepared* puck: one
-//! that rests in an area from which it can be shot, or crosses the table's long axis (the middle) slowly enough.
+//! that rests in an area from which it can be shot, or crosses the table's long axis slowly enough.
 
 use crate::contact::{SUBSTEP, substep};
 use crate::field::{Field, Vec2};
@@ -9,8 +9,8 @@ use crate::puck::{DRAG, Puck, Rim};
 const SAFE_Y: f64 = 0.365;
 /// Range of x in which a puck counts as prepared, with a margin, metres.
 const SAFE_X: (f64, f64) = (-0.78, -0.22);
-/// A puck at a smaller |y| has crossed the middle, which ends the episode, metres.
-const MIDDLE_Y: f64 = 0.01;
+/// A puck at a smaller |y| has crossed the long axis, which ends the episode, metres.
+const LONG_AXIS_Y: f64 = 0.01;
 /// Longest sliding of the puck on one segment, seconds: it has nearly stopped then.
 const HORIZON: f64 = 8.0;
 /// Deceleration of the mallet after a strike, m/s².
@@ -153,26 +153,27 @@ fn end_value(puck: &Puck) -> Option<f64> {
     if puck.pos.x > -0.01 {
         return Some(0.0);
     }
-    (puck.pos.y.abs() < MIDDLE_Y).then(|| crossing_value(puck.pos.x, puck.vel.x))
+    (puck.pos.y.abs() < LONG_AXIS_Y).then(|| crossing_value(puck.pos.x, puck.vel.x))
 }
 
-/// Value of crossing the middle at `x`, metres, with the speed `vx`, m/s: less near the limits of a success.
+/// Value of crossing the long axis at `x`, metres, with the speed `vx`, m/s: less near the limits of a success.
 fn crossing_value(x: f64, vx: f64) -> f64 {
     let x_margin = ((x - SAFE_X.0).min(SAFE_X.1 - x) / 0.06).clamp(0.0, 1.0);
     let slowness = ((0.09 - vx) / 0.06).clamp(0.0, 1.0);
     x_margin * slowness
 }
 
-/// Value of the position where the puck comes to rest or crosses the middle without another contact.
+/// Value of the position where the puck comes to rest or crosses the long axis without another contact.
 pub fn slide_value(field: &Field, mut puck: Puck) -> f64 {
     for _ in 0..8 {
         let (span, rim) = puck.next_rim(field).map_or((HORIZON, None), |(time, rim)| {
             (time.min(HORIZON), Some(rim))
         });
         let end = puck.pos + puck.vel * ((1.0 - (-DRAG * span).exp()) / DRAG);
-        if end.y * puck.pos.y < 0.0 || end.y.abs() < MIDDLE_Y {
-            // The puck crosses the middle on this segment.
-            let path_share = (puck.pos.y.abs() - MIDDLE_Y) / (puck.pos.y - end.y).abs().max(1e-9);
+        if end.y * puck.pos.y < 0.0 || end.y.abs() < LONG_AXIS_Y {
+            // The puck crosses the long axis on this segment.
+            let path_share =
+                (puck.pos.y.abs() - LONG_AXIS_Y) / (puck.pos.y - end.y).abs().max(1e-9);
             let x = puck.pos.x + path_share * (end.x - puck.pos.x);
             let vx = puck.vel.x - DRAG * (x - puck.pos.x);
             return crossing_value(x, vx);
@@ -194,12 +195,12 @@ pub fn slide_value(field: &Field, mut puck: Puck) -> f64 {
     }
     let pos = puck.pos;
     if pos.x > SAFE_X.0 && pos.x < SAFE_X.1 && pos.y.abs() < SAFE_Y {
-        // Crossing the middle at once is a little better than resting.
+        // Crossing the long axis at once is a little better than resting.
         return 0.97;
     }
     // Not prepared, but the next strike may be easier.
-    let off_rim = ((field.puck_y() - pos.y.abs()) / 0.12).clamp(0.0, 1.0);
-    let off_end = ((pos.x + field.puck_x()) / 0.2).clamp(0.0, 1.0);
+    let off_rim = ((field.puck_y_max() - pos.y.abs()) / 0.12).clamp(0.0, 1.0);
+    let off_end = ((pos.x + field.puck_x_max()) / 0.2).clamp(0.0, 1.0);
     if pos.x < -0.2 {
         0.3 + 0.4 * off_rim * off_end
     } else {

@@ -77,7 +77,7 @@ impl PointMass {
                     title: "speed".to_owned(),
                     column: "too fast".to_owned(),
                     short: "fast".to_owned(),
-                    breach: "too fast".to_owned(),
+                    description: "too fast".to_owned(),
                     measure: "Speed, m/s beyond the limit.".to_owned(),
                     points: [2.0, 2.0],
                 }],

@@ -50,9 +50,9 @@ NUMBER_LIMIT = 1e4
 JOINT_MARGIN_RAD = 0.01
 HEIGHT_MARGIN_M = 0.01
 # A pose is a solution if its end effector is this close to the point, metres.
-TOLERANCE_M = 1e-6
+SOLUTION_TOLERANCE_M = 1e-6
 # The least-squares iteration stops when the end effector is this close to the point, metres.
-GOAL_M = 1e-10
+CONVERGENCE_TOLERANCE_M = 1e-10
 # Most iterations.
 ITERATIONS = 100
 # Longest step of an iteration, in joint space.
@@ -244,7 +244,7 @@ def _least_squares(point: Vector, q0: Sequence[float]) -> list[float]:
         origins, axes = _chain(q)
         error = _sum(point, _scaled(origins[JOINTS], -1.0))
         deficit = LINK_HEIGHT_M + HEIGHT_MARGIN_M - origins[6][2]
-        if math.sqrt(_dot(error, error)) < GOAL_M and deficit <= 0.0:
+        if math.sqrt(_dot(error, error)) < CONVERGENCE_TOLERANCE_M and deficit <= 0.0:
             break
         rows = _jacobian(origins, axes)
         # Change of the wrist's height with each joint; joint 7's axis passes through the wrist.
@@ -312,7 +312,7 @@ def _is_solution(q: Sequence[float], point: Vector) -> bool:
     error = _sum(point, _scaled(origins[JOINTS], -1.0))
     lowest = min(origins[3][2], origins[6][2])
     return (
-        _dot(error, error) <= TOLERANCE_M * TOLERANCE_M
+        _dot(error, error) <= SOLUTION_TOLERANCE_M * SOLUTION_TOLERANCE_M
         and lowest >= LINK_HEIGHT_M + HEIGHT_MARGIN_M - 1e-9
         and all(abs(a) <= bound for a, bound in zip(q, JOINT_BOUND_RAD))
     )

@@ -181,7 +181,7 @@ def _least_squares(point: Floats, q0: Floats) -> Floats:
         origins, axes = _chain(pose)
         error = point[active] - origins[:, -1]
         deficit = _MIN_HEIGHT - origins[:, 6, 2]
-        unfinished = (np.sqrt(np.sum(error * error, axis=-1)) >= plain.GOAL_M) | (deficit > 0.0)
+        unfinished = (np.sqrt(np.sum(error * error, axis=-1)) >= plain.CONVERGENCE_TOLERANCE_M) | (deficit > 0.0)
         if not unfinished.any():
             break
         active, pose = active[unfinished], pose[unfinished]
@@ -229,7 +229,7 @@ def is_solution(q: Floats, point: Floats) -> NDArray[np.bool_]:
     """Whether poses (..., 7) put the end effector at points (..., 3) within all bounds: (...)."""
     origins, _ = _chain(q)
     error = point - origins[..., -1, :]
-    near = np.sum(error * error, axis=-1) <= plain.TOLERANCE_M**2
+    near = np.sum(error * error, axis=-1) <= plain.SOLUTION_TOLERANCE_M**2
     high = np.min(origins[..., [3, 6], 2], axis=-1) >= _MIN_HEIGHT - 1e-9
     solved: NDArray[np.bool_] = near & high & np.all(np.abs(q) <= _BOUND, axis=-1)
     return solved

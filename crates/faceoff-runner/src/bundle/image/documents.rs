@@ -55,9 +55,10 @@ impl LayerPart {
     }
 }
 
-/// An entry of `manifest.json`, as written by `docker save`. All tags of an image are in one entry.
+/// Configuration and layers of an image, as file names in the archive. The entries of Docker's `manifest.json` have this form, with all
+/// tags of an image in one entry; for an OCI layout it is composed.
 #[derive(Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
-struct DockerImage {
+struct ImageManifest {
     #[serde(rename = "Config")]
     config: String,
     #[serde(rename = "Layers")]
@@ -251,15 +252,15 @@ fn build_steps(history: Vec<Step>, layers: usize) -> Vec<Option<String>> {
     steps.into_iter().map(shown).collect()
 }
 
-fn read_docker_list(archive: &mut Archive<'_>) -> Result<DockerImage, BundleError> {
-    let all: Vec<DockerImage> = archive.document(DOCKER_LIST).map_err(with_image_hint)?;
+fn read_docker_list(archive: &mut Archive<'_>) -> Result<ImageManifest, BundleError> {
+    let all: Vec<ImageManifest> = archive.document(DOCKER_LIST).map_err(with_image_hint)?;
     let tags: BTreeSet<String> = all
         .iter()
         .flat_map(|image| image.tags.iter().flatten().cloned())
         .collect();
-    let mut images: BTreeSet<DockerImage> = all
+    let mut images: BTreeSet<ImageManifest> = all
         .into_iter()
-        .map(|image| DockerImage {
+        .map(|image| ImageManifest {
             tags: None,
             ..image
         })
@@ -273,15 +274,15 @@ fn read_docker_list(archive: &mut Archive<'_>) -> Result<DockerImage, BundleErro
     }
 }
 
-fn read_oci_layout(archive: &mut Archive<'_>) -> Result<(DockerImage, Config), BundleError> {
+fn read_oci_layout(archive: &mut Archive<'_>) -> Result<(ImageManifest, Config), BundleError> {
     let list: OciList = archive.document(OCI_INDEX).map_err(with_image_hint)?;
     let image = choose_image(collect_images(archive, list)?)?;
     let image: OciImage = archive.document(&Digest::parse(&image.digest)?.blob_path())?;
-    let blob_path = |layer_part: &Descriptor| {
-        Digest::parse(&layer_part.digest).map(|digest| digest.blob_path())
+    let blob_path = |descriptor: &Descriptor| {
+        Digest::parse(&descriptor.digest).map(|digest| digest.blob_path())
     };
     let layers = image.layers.unwrap_or_default();
-    let image = DockerImage {
+    let image = ImageManifest {
         config: blob_path(&image.config)?,
         layers: layers.iter().map(blob_path).collect::<Result<_, _>>()?,
         tags: None,

@@ -575,7 +575,7 @@ impl Sink for Root<'_> {
             return Ok(());
         };
         let top = location.folder.first().unwrap_or(&location.name);
-        if special == Special::NullDevice && !SANDBOX_FOLDERS.contains(&top.as_str()) {
+        if special == Special::OverlayfsWhiteout && !SANDBOX_FOLDERS.contains(&top.as_str()) {
             return Err(invalid_entry(
                 entry,
                 "is a whiteout of overlayfs (a device 0/0), which layers do not have: expected \

@@ -193,7 +193,7 @@ pub(super) fn label(outcome: &Result<(), VerifyError>) -> &'static str {
         Err(VerifyError::Dataset(DatasetError::Foreign(_))) => "foreign",
         Err(VerifyError::Dataset(DatasetError::Altered(_))) => "altered",
         Err(VerifyError::Dataset(DatasetError::Absent(_))) => "absent",
-        Err(VerifyError::Workers(error)) => panic!("{error}"),
+        Err(VerifyError::Threads(error)) => panic!("{error}"),
         Err(VerifyError::Recording(error)) => panic!("{error}"),
         Err(VerifyError::Job(error)) => panic!("{error}"),
     }

@@ -241,7 +241,7 @@ impl Observer for PoolObserver<'_> {
         lock(&self.0.logs).add(log);
     }
 
-    fn on_answer(&self) {
+    fn on_agent_running(&self) {
         let has_answered = &self.0.has_answered;
         if !has_answered.load(Ordering::Relaxed) && !has_answered.swap(true, Ordering::Relaxed) {
             self.0.end_wait_for_answer();

@@ -141,9 +141,9 @@ pub(in crate::commands) fn attempts_text(attempts: &[GameAttemptView]) -> String
                 let outcome = match end {
                     AttemptOutcomeView::Played => "finished",
                     AttemptOutcomeView::PlatformFailed => "platform fault",
-                    AttemptOutcomeView::GivenBack => "released by its slot",
+                    AttemptOutcomeView::Released => "released by its slot",
                     AttemptOutcomeView::Lost => "lost with its slot",
-                    AttemptOutcomeView::CalledOff => "cancelled",
+                    AttemptOutcomeView::Cancelled => "cancelled",
                 };
                 format!("{outcome} {}", exact_time_text(ended_at))
             }

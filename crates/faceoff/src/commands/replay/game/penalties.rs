@@ -68,9 +68,9 @@ fn violations(course: &SideCourse, start: u32) -> impl Iterator<Item = (u32, f64
                     to.min(*samples.end()) - from.max(*samples.start()) + 1
                 })
                 .sum();
-            let worst = here().map(|violation| violation.worst).fold(0.0, f64::max);
+            let max_excess = here().map(|violation| violation.max_excess).fold(0.0, f64::max);
             let cause = format!(
-                "{title} limit violated in {steps} control steps of {}, by up to {worst:.4} {unit}",
+                "{title} limit violated in {steps} control steps of {}, by up to {max_excess:.4} {unit}",
                 window_text(start)
             );
             Some((first, points, cause))

@@ -1,5 +1,5 @@
-//! Secrets and invitation links as people and their programs hand them on: quoted, with a full stop, wrapped by a mail program, or behind
-//! the link scanner of a company.
+//! Extracts secrets and invitation links from text as people copy it: with quotes, a full stop, line breaks of a mail program, or
+//! inside the URL of a link scanner.
 
 use percent_encoding::percent_decode_str;
 
@@ -12,7 +12,7 @@ const DIGITS: usize = 64;
 /// The secret in a text that may have something around it, or the trimmed text if there is none. A secret that is broken into lines is not
 /// found; see [`InvitationLink`].
 #[must_use]
-pub fn secret_in(text: &str) -> &str {
+pub fn extract_secret(text: &str) -> &str {
     let found = text.match_indices(PREFIX).find_map(|(start, _)| {
         let rest = &text[start + PREFIX.len()..];
         let kind = rest.find('_')?;
@@ -161,7 +161,7 @@ mod tests {
                 format!("\u{feff}{secret}"),
                 format!("<{secret}>."),
             ] {
-                assert_eq!(secret_in(&text), secret, "{text:?}");
+                assert_eq!(extract_secret(&text), secret, "{text:?}");
             }
         }
         for (text, expected) in [
@@ -170,9 +170,13 @@ mod tests {
             ("fo_", "fo_"),
             ("größer fo_team_ö", "größer fo_team_ö"),
         ] {
-            assert_eq!(secret_in(text), expected, "{text:?}");
+            assert_eq!(extract_secret(text), expected, "{text:?}");
         }
         let longer = format!("fo_team_{HEX}0");
-        assert_eq!(secret_in(&longer), longer, "no other secret is made of it");
+        assert_eq!(
+            extract_secret(&longer),
+            longer,
+            "no other secret is made of it"
+        );
     }
 }

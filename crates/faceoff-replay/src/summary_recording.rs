@@ -1,18 +1,18 @@
 //! The summary of an episode in a world other than air hockey, of which there are no clips.
 
-use crate::clip_index::{EpisodeLine, TimeBins, ViolationSummary};
+use crate::clip_index::{EpisodeIndexEntry, TimeBins, ViolationSummary};
 use faceoff_episode::StepRow;
 use faceoff_types::{Competition, EpisodeOutcome, escape_unprintable};
 
 /// An episode of which only the summary is recorded.
 #[derive(Debug, Default)]
-pub(crate) struct PlainRecording {
+pub(crate) struct SummaryRecording {
     violations: Vec<ViolationSummary>,
     /// Computation times, s.
     times_s: Vec<f64>,
 }
 
-impl PlainRecording {
+impl SummaryRecording {
     pub fn step(&mut self, row: &StepRow<'_>, competition: &Competition) {
         let sample = row.step + 1;
         let limits = competition
@@ -27,7 +27,7 @@ impl PlainRecording {
                 .find(|known| known.constraint == *name);
             if let Some(violation) = known {
                 violation.samples += 1;
-                violation.worst = violation.worst.max(*value);
+                violation.max_excess = violation.max_excess.max(*value);
             } else {
                 let begun = ViolationSummary::begin(*name, sample, *value);
                 self.violations.push(begun);
@@ -42,7 +42,7 @@ impl PlainRecording {
         outcome: &EpisodeOutcome,
         competition: &Competition,
         times: &mut TimeBins,
-    ) -> EpisodeLine {
+    ) -> EpisodeIndexEntry {
         let step_s = competition.duration_s(outcome.task, 1);
         let late = self.times_s.iter().filter(|time_s| **time_s > step_s);
         let late_answers = u32::try_from(late.count()).unwrap_or(u32::MAX);
@@ -53,15 +53,15 @@ impl PlainRecording {
             (None, Some(info)) => info.title.clone(),
             (None, None) => outcome.end.to_string(),
         };
-        EpisodeLine {
+        EpisodeIndexEntry {
             task: outcome.task,
             episode: outcome.episode,
             steps: outcome.steps,
             success: outcome.success,
             end: outcome.end,
             end_description: escape_unprintable(&description).into_owned(),
-            start: None,
-            last: None,
+            puck_at_start: None,
+            puck_at_end: None,
             violations: self.violations,
             longest_s: Some(self.times_s.iter().copied().fold(0.0, f64::max)),
             late_answers,

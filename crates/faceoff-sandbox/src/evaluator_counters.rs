@@ -12,7 +12,7 @@ use std::{cell::RefCell, fs::File, time::Duration};
 /// The counters of the calling thread at one time. Only the difference of two readings by the same thread has a
 /// meaning.
 #[derive(Debug, Clone, Default)]
-pub struct CallerCounters {
+pub struct EvaluatorCounters {
     wait_time: Duration,
     /// Run time of the thread that reads the agent's log.
     log_reader_run_time: Duration,
@@ -26,7 +26,7 @@ thread_local! {
         RefCell::new(File::open("/proc/thread-self/schedstat").ok());
 }
 
-impl CallerCounters {
+impl EvaluatorCounters {
     /// Reads the counters now. `stat` is the content of `/proc/stat`, just read by the caller, because reading it costs more than
     /// all the rest. `cpus` are the CPUs that the thread may use.
     pub(crate) fn read(stat: &str, cpus: &[usize], log_reader_run_time: Duration) -> Self {
@@ -72,7 +72,7 @@ mod tests {
         thread::scope(|scope| {
             let pinned = scope.spawn(|| {
                 affinity::pin_current_thread(&[cpu]).unwrap();
-                let read = || CallerCounters::read("", &[], Duration::ZERO);
+                let read = || EvaluatorCounters::read("", &[], Duration::ZERO);
                 let earlier = read();
                 // The other thread never sleeps and uses the same CPU.
                 while read().run_delay_since(&earlier) < Duration::from_millis(20) {}
@@ -90,7 +90,7 @@ mod tests {
 
     #[test]
     fn run_time_of_the_log_reader_is_subtracted() {
-        let counters = |waited_ms, ran_ms| CallerCounters {
+        let counters = |waited_ms, ran_ms| EvaluatorCounters {
             wait_time: Duration::from_millis(waited_ms),
             log_reader_run_time: Duration::from_millis(ran_ms),
             ticks: Vec::new(),
@@ -111,7 +111,7 @@ mod tests {
 
     #[test]
     fn steal_time_counts_only_if_all_cpus_have_it() {
-        let with_steal_ticks = |each: &[u64]| CallerCounters {
+        let with_steal_ticks = |each: &[u64]| EvaluatorCounters {
             wait_time: Duration::ZERO,
             log_reader_run_time: Duration::ZERO,
             ticks: each
