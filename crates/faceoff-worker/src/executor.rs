@@ -22,7 +22,7 @@ use faceoff_wire::job::{
 use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
 
 /// Runs the jobs of a slot. All errors are platform faults, with one exception: a job also ends with an error soon after
-/// [`Progress::stopped`] becomes true.
+/// [`Progress::must_stop`] becomes true.
 pub(crate) struct Executor {
     /// Timing quality of the slot in the last shard.
     pub(crate) timing: Option<SlotTiming>,
@@ -69,7 +69,7 @@ impl AgentHost {
             runtimes: self.runtimes.clone(),
             images: self.images,
             agent_cpus,
-            supervision: Supervision::new(move || progress.stopped()),
+            supervision: Supervision::new(move || progress.must_stop()),
             simulator: Arc::clone(&self.simulator),
         }
     }
@@ -182,7 +182,7 @@ impl Executor {
         let environment = self.host.environment(&agent.limits, progress);
         let validated = self
             .evaluator
-            .validate(spec, &bundle, &environment, &|| progress.stopped())?;
+            .validate(spec, &bundle, &environment, &|| progress.must_stop())?;
         let (agent_name, timing, log) = (bundle.manifest.name, validated.timing, validated.log);
         Ok(match validated.failure {
             None => ValidationOutcome::Valid {

@@ -52,7 +52,7 @@ impl LiveFeedSink for GameBroadcast {
     }
 
     fn cancelled(&self) -> bool {
-        self.progress.stopped()
+        self.progress.must_stop()
     }
 }
 

@@ -14,7 +14,7 @@ use faceoff_types::{
 };
 use faceoff_wire::{
     job::{JobPayload, JobReport, Lease, OutputFiles, ShardSpec},
-    remote::{JobEnd, RemoteJob, ResultMessage, WorkerCapabilities, WorkerRequest, WorkerResponse},
+    remote::{RemoteJobEnd, RemoteJob, ResultMessage, WorkerCapabilities, WorkerRequest, WorkerResponse},
 };
 use futures::StreamExt as _;
 use reqwest::{StatusCode, header};
@@ -311,7 +311,7 @@ impl SimulatedWorker {
         if self.request(&start).await? != WorkerResponse::Accepted {
             return Ok(None);
         }
-        lease.slot = format!("remote/{}/{SLOT}", self.name);
+        lease.holder = format!("remote/{}/{SLOT}", self.name);
         let JobPayload::Shard {
             part_of,
             agent,
@@ -396,12 +396,12 @@ impl SimulatedWorker {
             let renew = WorkerRequest::RenewLease {
                 lease: job.lease.clone(),
                 episodes_done: (progress * episodes as f64) as u32,
-                trouble: None,
+                send_problem: None,
             };
             match self.request(&renew).await {
                 Ok(WorkerResponse::Accepted) => {}
                 Ok(WorkerResponse::Refused { .. }) => return,
-                Ok(WorkerResponse::Unknown) | Err(_) => *unanswered += 1,
+                Ok(WorkerResponse::Unavailable) | Err(_) => *unanswered += 1,
             }
         }
     }
@@ -421,7 +421,7 @@ impl SimulatedWorker {
         let result = ResultMessage {
             lease: job.lease.clone(),
             grant: job.grant.clone(),
-            end: JobEnd::Done {
+            end: RemoteJobEnd::Done {
                 report: Box::new(report),
             },
         };

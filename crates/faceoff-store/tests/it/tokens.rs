@@ -96,14 +96,14 @@ async fn token_is_valid_until_expired_rotated_or_revoked() {
     for _ in 0..2 {
         let revoked = f
             .store
-            .revoke_token(Actor::Host, unlimited.id, EndMade::Keep, f.now)
+            .revoke_token(Actor::Host, unlimited.id, CreatedCredentials::Keep, f.now)
             .await;
         assert_eq!(revoked.unwrap().token.revoked_at, Some(f.now));
     }
     assert_eq!(rejection(&f, 5).await, Some(TokenRejection::Revoked(f.now)));
     let unknown = f
         .store
-        .revoke_token(Actor::Host, TokenId::new(), EndMade::Keep, f.now)
+        .revoke_token(Actor::Host, TokenId::new(), CreatedCredentials::Keep, f.now)
         .await;
     assert!(matches!(unknown, Err(StoreError::NotFound("token"))));
     let events = f.store.events_after(0, 100).await.unwrap();
@@ -138,7 +138,7 @@ async fn token_use_is_recorded_and_tokens_are_limited() {
     assert_eq!(used.last_used_at, Some(f.now));
     // A revoked token does not count towards the limit.
     f.store
-        .revoke_token(Actor::Host, used.id, EndMade::Keep, f.now)
+        .revoke_token(Actor::Host, used.id, CreatedCredentials::Keep, f.now)
         .await
         .unwrap();
     f.store
@@ -182,14 +182,14 @@ async fn host_token_follows_its_file_and_stays_revoked() {
     rotate(other_host_token.id, 9).await.unwrap();
     assert!(!f.store.set_host_token([1; 32], f.now).await.unwrap());
     f.store
-        .revoke_token(Actor::Host, other_host_token.id, EndMade::Keep, f.now)
+        .revoke_token(Actor::Host, other_host_token.id, CreatedCredentials::Keep, f.now)
         .await
         .unwrap();
     assert!(!f.store.set_host_token([9; 32], f.now).await.unwrap());
 }
 
 #[tokio::test]
-async fn makers_of_earlier_versions_come_from_the_log() {
+async fn creators_missing_in_earlier_versions_come_from_the_log() {
     let f = TestStore::new().await;
     let team = f.create_team("Alpha").await;
     let owner = TokenOwner::Team(team.id);
@@ -379,7 +379,7 @@ async fn tokens_and_invitations_are_listed_page_by_page() {
 }
 
 #[tokio::test]
-async fn ended_credentials_are_forgotten_after_a_month() {
+async fn ended_credentials_are_deleted_after_a_month() {
     let mut f = TestStore::new().await;
     let team = f.create_team("Alpha").await.id;
     add_user(&f, 100, "Ada", InvitationRole::Member(team)).await;
@@ -403,7 +403,7 @@ async fn ended_credentials_are_forgotten_after_a_month() {
     let leaf = create(&f, 3, Some((next, [9; 32]))).await;
     for ended in [middle, next] {
         f.store
-            .revoke_token(Actor::Host, ended, EndMade::Keep, f.now)
+            .revoke_token(Actor::Host, ended, CreatedCredentials::Keep, f.now)
             .await
             .unwrap();
     }
@@ -412,7 +412,7 @@ async fn ended_credentials_are_forgotten_after_a_month() {
     let of_host = f.store.verify_token([7; 32], TokenKind::ApiToken, f.now);
     let of_host = of_host.await.unwrap().unwrap().token.id;
     f.store
-        .revoke_token(Actor::Host, of_host, EndMade::Keep, f.now)
+        .revoke_token(Actor::Host, of_host, CreatedCredentials::Keep, f.now)
         .await
         .unwrap();
     let expires_at = f.now + SignedDuration::from_hours(1);
@@ -434,12 +434,12 @@ async fn ended_credentials_are_forgotten_after_a_month() {
         .unwrap();
 
     f.advance_clock_s(30 * 24 * 3600 - 1);
-    assert_eq!(f.store.forget_ended_credentials(f.now).await.unwrap(), 0);
+    assert_eq!(f.store.delete_ended_credentials(f.now).await.unwrap(), 0);
     f.advance_clock_s(1);
-    assert_eq!(f.store.forget_ended_credentials(f.now).await.unwrap(), 2);
+    assert_eq!(f.store.delete_ended_credentials(f.now).await.unwrap(), 2);
     f.advance_clock_s(3600);
-    assert_eq!(f.store.forget_ended_credentials(f.now).await.unwrap(), 2);
-    assert_eq!(f.store.forget_ended_credentials(f.now).await.unwrap(), 0);
+    assert_eq!(f.store.delete_ended_credentials(f.now).await.unwrap(), 2);
+    assert_eq!(f.store.delete_ended_credentials(f.now).await.unwrap(), 0);
 
     let tokens = all_tokens(&f).await;
     let of_team: Vec<TokenId> = tokens
@@ -455,9 +455,9 @@ async fn ended_credentials_are_forgotten_after_a_month() {
     };
     assert!(matches!(accepted.state, InvitationState::Accepted { .. }));
     assert!(!f.store.set_host_token([7; 32], f.now).await.unwrap());
-    // What was made with the forgotten tokens still ends with the token that made that one.
+    // A token that was created with a deleted token still ends with the token with which the deleted one was created.
     f.store
-        .revoke_token(Actor::Host, root, EndMade::Except(None), f.now)
+        .revoke_token(Actor::Host, root, CreatedCredentials::EndExcept(None), f.now)
         .await
         .unwrap();
     assert_eq!(rejection(&f, 3).await, Some(TokenRejection::Revoked(f.now)));

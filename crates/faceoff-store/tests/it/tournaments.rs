@@ -811,7 +811,7 @@ async fn friendly_games_have_a_quota_and_wait_for_rounds() {
     let change = TournamentChange {
         baseline: Some(Some(baseline)),
         settings: Some(TournamentSettings {
-            free_games_per_day: 3,
+            test_and_friendly_games_per_day: 3,
             ..TournamentSettings::default()
         }),
         ..TournamentChange::default()

@@ -483,7 +483,7 @@ pub(super) fn limits() -> Limits {
         open_files: 64,
         file_size_bytes: 1 << 20,
         cpus: 1.0,
-        stderr_tail_bytes: 1 << 16,
+        stderr_kept_bytes: 1 << 16,
     }
 }
 

@@ -162,7 +162,7 @@ async fn jobs_and_ablations_use_the_stages_variation() {
                 assert_eq!(spec.perturbations, changed_variation.perturbations);
                 changed_jobs += 1;
             }
-            JobPayload::Scoring { meta, .. } => assert!(meta.variation.is_none()),
+            JobPayload::Scoring { meta, .. } => assert!(meta.variation.is_empty()),
             _ => {}
         }
         complete_and_commit(&server, &job).await;

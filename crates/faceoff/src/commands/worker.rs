@@ -13,7 +13,7 @@ use faceoff_metrics::Metrics;
 use faceoff_sandbox::probe_host;
 use faceoff_types::is_printable;
 use faceoff_wire::remote::WorkerCapabilities;
-use faceoff_worker::{CpuLayout, RemoteWorker, SlotThreads, SlotsConfig};
+use faceoff_worker::{CpuLayout, RemoteWorkerConfig, SlotThreads, SlotsConfig};
 use jiff::SignedDuration;
 use std::{
     fs,
@@ -103,7 +103,7 @@ impl WorkerCommand {
         let scratch_dir = config.scratch_dir();
         fs::create_dir_all(&scratch_dir)
             .with_context(|| format!("creating the folder {}", scratch_dir.display()))?;
-        let worker = RemoteWorker {
+        let worker = RemoteWorkerConfig {
             nats,
             name,
             capabilities,
@@ -127,7 +127,7 @@ impl WorkerCommand {
     }
 }
 
-async fn run_until_signal(worker: RemoteWorker) -> anyhow::Result<()> {
+async fn run_until_signal(worker: RemoteWorkerConfig) -> anyhow::Result<()> {
     let shutdown = CancellationToken::new();
     let mut worker_task = tokio::spawn(faceoff_worker::run_remote_worker(worker, shutdown.clone()));
     let signal = super::serve::shutdown_signal()?;
