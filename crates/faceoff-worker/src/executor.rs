@@ -1,7 +1,7 @@
 //! Runs the jobs of a slot, one method per kind of job.
 
 use crate::{
-    bundle_cache::{BundleCache, Unpacked},
+    bundle_cache::{BundleCache, UnpackResult},
     cpus::SlotCpus,
     evaluator::Evaluator,
     files::FileStore,
@@ -123,7 +123,7 @@ impl Executor {
         agent: &AgentSpec,
         opponent: Option<&AgentSpec>,
         progress: &Progress,
-    ) -> anyhow::Result<Unpacked> {
+    ) -> anyhow::Result<UnpackResult> {
         self.bundles
             .get(agent, opponent, &*self.evaluator, &*self.files, progress)
     }
@@ -136,8 +136,8 @@ impl Executor {
         progress: &Progress,
     ) -> anyhow::Result<Bundle> {
         match self.unpacked_bundle(agent, opponent, progress)? {
-            Unpacked::Bundle(bundle) => Ok(bundle),
-            Unpacked::Invalid(reason) => anyhow::bail!(reason),
+            UnpackResult::Bundle(bundle) => Ok(bundle),
+            UnpackResult::Invalid(reason) => anyhow::bail!(reason),
         }
     }
 
@@ -158,8 +158,8 @@ impl Executor {
         progress: &Progress,
     ) -> anyhow::Result<ValidationOutcome> {
         let bundle = match self.unpacked_bundle(agent, None, progress)? {
-            Unpacked::Bundle(bundle) => bundle,
-            Unpacked::Invalid(reason) => {
+            UnpackResult::Bundle(bundle) => bundle,
+            UnpackResult::Invalid(reason) => {
                 return Ok(ValidationOutcome::Invalid {
                     agent_name: None,
                     runtime: None,

@@ -34,7 +34,7 @@ use tokio_util::sync::CancellationToken;
 #[derive(Debug, Clone)]
 pub(crate) struct LocalServer {
     pub(crate) store: Store,
-    /// Viewers of games and organisers see it.
+    /// State of running games and remote workers, shown to viewers and organisers.
     pub(crate) live: LiveState,
     pub(crate) runtime: Handle,
     pub(crate) clock: Clock,
@@ -49,7 +49,7 @@ pub(crate) struct LocalServer {
 }
 
 impl LocalServer {
-    /// The competition whose jobs it hands out.
+    /// The competition to which all jobs belong.
     pub(crate) fn competition(&self) -> &Arc<Competition> {
         self.simulator.competition()
     }

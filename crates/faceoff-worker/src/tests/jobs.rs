@@ -280,7 +280,7 @@ async fn dataset_of_a_lost_lease_is_removed() {
 async fn lost_commit_response_keeps_the_dataset() {
     let server = Server::new().await;
     let id = server.start_evaluation().await;
-    let evaluator = Scripted::new(|_, _| Ok(()));
+    let evaluator = ScriptedEvaluator::new(|_, _| Ok(()));
     let running = server.start_intercepted_slots(2, &evaluator, |local| {
         InterceptedServer::shared(local, |interception| match interception {
             Interception::Committed(JobReport::Scoring { .. }) => {

@@ -49,7 +49,7 @@ pub(super) fn run(config: Config, connections: ConnectionLimits) -> anyhow::Resu
     let service = thread::Builder::new()
         .name("service".to_owned())
         .spawn(move || {
-            let runtime = low_priority_runtime(&slots.cpus.service)?;
+            let runtime = low_priority_runtime(&slots.cpus.server)?;
             runtime.block_on(serve(config, connections, slots))
         })
         .context("starting the service thread")?;
@@ -117,7 +117,7 @@ async fn serve(
         %address,
         data_dir = %data_dir.display(),
         slots = workers.slots.cpus.slots.len(),
-        service_cpus = ?workers.slots.cpus.service,
+        service_cpus = ?workers.slots.cpus.server,
         "serving"
     );
 
