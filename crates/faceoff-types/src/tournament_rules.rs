@@ -167,14 +167,13 @@ impl TournamentRules {
             }
         }
         let GameLimits {
-            // Longest time of an answer that still takes effect.
-            in_time_s,
+            max_answer_s,
             total_s,
             restart_s,
             max_faults: _,
         } = self.game_limits;
         for (field, got, most, expected) in [
-            ("in_time_s", in_time_s, 1.0, "above 0, at most 1"),
+            ("in_time_s", max_answer_s, 1.0, "above 0, at most 1"),
             ("total_s", total_s, 86_400.0, "above 0, at most 86400"),
             ("restart_s", restart_s, 600.0, "above 0, at most 600"),
         ] {

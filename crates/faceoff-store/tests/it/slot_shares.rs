@@ -279,7 +279,7 @@ async fn slow_uploads_do_not_delay_other_teams() {
 }
 
 #[tokio::test]
-async fn upload_flood_delays_other_upload_by_one() {
+async fn upload_flood_delays_other_team_by_one_job() {
     let mut s = Slots::new(1).await;
     let flood = s.create_team("Flood").await;
     for _ in 0..20 {

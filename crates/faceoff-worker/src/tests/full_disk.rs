@@ -39,7 +39,7 @@ async fn full_disk_does_not_count_as_an_attempt() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn commit_waits_for_disk_space_without_replaying() {
+async fn commit_waits_for_disk_space_without_running_the_job_again() {
     let server = Server::new().await;
     let id = server.start_evaluation().await;
     let evaluator = ScriptedEvaluator::new(|_, _| Ok(()));

@@ -5,7 +5,7 @@ use jiff::{SignedDuration, Timestamp};
 use std::sync::{Arc, Mutex};
 
 #[tokio::test]
-async fn no_day_starts_before_the_newest_change() {
+async fn no_day_starts_while_the_clock_is_behind_the_database() {
     let folder = tempfile::tempdir().unwrap();
     let store = new_store(folder.path()).await;
     let first: Timestamp = "2026-03-01T00:00:00Z".parse().unwrap();

@@ -335,7 +335,7 @@ async fn stage_change_keeps_the_fields_it_leaves_out() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn temporary_failures_are_repeated_for_a_while() {
+async fn request_is_retried_while_its_failures_are_temporary() {
     use std::sync::atomic::{AtomicU32, Ordering};
     let refused = |status: StatusCode| ApiError {
         status,

@@ -91,7 +91,7 @@ pub(super) async fn act(client: &Client, json: bool, action: ProposalAction) -> 
         } => {
             let stage = find_stage(client, &stage).await?;
             client
-                .trial(stage.id, &Trial { submission, reason })
+                .start_trial(stage.id, &Trial { submission, reason })
                 .await?
         }
         ProposalAction::Evaluation { evaluation, reason } => {

@@ -70,7 +70,7 @@ pub(super) fn describe(path: &Path, simulated: &SimulatedGame) -> String {
         let limits = &result.limits;
         format!(
             "; with custom limits: answers accepted up to {} s, {} faults allowed, {} s in total",
-            limits.in_time_s, limits.max_faults, limits.total_s
+            limits.max_answer_s, limits.max_faults, limits.total_s
         )
     };
     format!(
