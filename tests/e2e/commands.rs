@@ -108,7 +108,7 @@ pub fn admin_as(server: &Server, token: &str, args: &[&str]) -> CommandOutput {
     faceoff(&[&options[..], args].concat(), "")
 }
 
-/// `faceoff admin` with the administration token of the server's host.
+/// `faceoff admin` with the host's token.
 pub fn admin(server: &Server, args: &[&str]) -> CommandOutput {
     admin_as(server, &server.admin_token, args)
 }

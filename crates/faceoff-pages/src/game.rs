@@ -265,7 +265,7 @@ fn state_text(status: &GameStatus, is_hidden: bool) -> String {
         GameStatus::Played { finished_at, .. } => {
             format!("Played on {}.", finished_at.strftime("%Y-%m-%d, %H:%M UTC"))
         }
-        GameStatus::Broken { reason, .. } => {
+        GameStatus::PlatformFailed { reason, .. } => {
             format!("Failed because of a platform fault: {reason}")
         }
         // The reason is free text and may reveal the result.

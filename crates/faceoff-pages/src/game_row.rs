@@ -108,7 +108,7 @@ fn game_state(status: &GameStatus, teams: &[TeamName; 2], is_hidden: bool) -> Ga
                 winner: teams.iter().position(is_winner),
             }
         }
-        GameStatus::Broken { .. } => GameState::Failed,
+        GameStatus::PlatformFailed { .. } => GameState::Failed,
         GameStatus::Void { .. } => GameState::Void,
         GameStatus::Cancelled { .. } => GameState::Cancelled,
     }
@@ -123,7 +123,7 @@ fn summary(status: &GameStatus, is_hidden: bool) -> String {
             Some(winner) => format!("{winner} wins: {}", result.because),
             None => format!("draw: {}", result.because),
         },
-        GameStatus::Broken { .. } => "platform fault, to be played again".to_owned(),
+        GameStatus::PlatformFailed { .. } => "platform fault, to be played again".to_owned(),
         // The reason is free text and may reveal the result.
         GameStatus::Void { .. } if is_hidden => "voided, to be played again".to_owned(),
         GameStatus::Void { reason, .. } => format!("voided, to be played again: {reason}"),

@@ -209,7 +209,9 @@ impl TournamentSettings {
     /// The first setting that is out of range.
     pub const fn check(&self) -> Result<(), InvalidTournament> {
         if self.test_and_friendly_games_per_day > MAX_TEST_AND_FRIENDLY_GAMES {
-            return Err(InvalidTournament::TestAndFriendlyGames(self.test_and_friendly_games_per_day));
+            return Err(InvalidTournament::TestAndFriendlyGames(
+                self.test_and_friendly_games_per_day,
+            ));
         }
         Ok(())
     }
@@ -290,6 +292,9 @@ mod tests {
             test_and_friendly_games_per_day: MAX_TEST_AND_FRIENDLY_GAMES + 1,
             ..TournamentSettings::default()
         };
-        assert_eq!(many.check(), Err(InvalidTournament::TestAndFriendlyGames(1001)));
+        assert_eq!(
+            many.check(),
+            Err(InvalidTournament::TestAndFriendlyGames(1001))
+        );
     }
 }

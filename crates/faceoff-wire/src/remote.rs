@@ -85,11 +85,7 @@ pub enum WorkerRequest {
         /// Number of episodes played so far; in a game, number of windows (parts of 500 control steps).
         episodes_done: u32,
         /// The problem that prevents the worker from sending the result, for organisers.
-        #[serde(
-            default,
-            rename = "trouble",
-            skip_serializing_if = "Option::is_none"
-        )]
+        #[serde(default, rename = "trouble", skip_serializing_if = "Option::is_none")]
         send_problem: Option<String>,
     },
     /// Reports that the result message is stored in NATS. From now on the server itself keeps the lease valid until it has accepted

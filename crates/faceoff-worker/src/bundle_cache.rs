@@ -46,7 +46,7 @@ impl BundleCache {
 
     /// Returns the unpacked bundle of `agent`, and fetches it if it is not in the cache. All other bundles are removed,
     /// except that of the `opponent` in a game. The content is what was uploaded: the hash is checked on every fetch, and
-    /// agents see the folder read-only. An error is a platform fault, or `progress` must stop.
+    /// agents see the folder read-only. An error is a platform fault, or the slot must stop (see `progress`).
     pub(crate) fn get(
         &mut self,
         agent: &AgentSpec,

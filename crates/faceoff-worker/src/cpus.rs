@@ -119,7 +119,10 @@ impl CpuLayout {
             .collect();
         let (simulators, server_cpus) = if others.len() > slots {
             let (server_cpus, simulators) = others.split_at(others.len() - slots);
-            (simulators.iter().map(|cpu| vec![*cpu]).collect(), server_cpus)
+            (
+                simulators.iter().map(|cpu| vec![*cpu]).collect(),
+                server_cpus,
+            )
         } else {
             (vec![Vec::new(); slots], &others[..])
         };

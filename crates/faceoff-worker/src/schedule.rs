@@ -27,23 +27,24 @@ pub async fn run_schedule(
     let mut failed = false;
     loop {
         let now = clock.now();
-        let next_start = match update_due_days_unless_behind(&store, &competition, &clock, now).await {
-            Ok(next_start) => {
-                failed = false;
-                next_start
-            }
-            Err(error) => {
-                // Logged once, since it recurs every second.
-                if !failed {
-                    tracing::error!(
-                        error = format!("{error:#}"),
-                        "days could not be ended or started; trying again"
-                    );
+        let next_start =
+            match update_due_days_unless_behind(&store, &competition, &clock, now).await {
+                Ok(next_start) => {
+                    failed = false;
+                    next_start
                 }
-                failed = true;
-                None
-            }
-        };
+                Err(error) => {
+                    // Logged once, since it recurs every second.
+                    if !failed {
+                        tracing::error!(
+                            error = format!("{error:#}"),
+                            "days could not be ended or started; trying again"
+                        );
+                    }
+                    failed = true;
+                    None
+                }
+            };
         let wait = next_start.map_or(LONGEST_SLEEP, |start| {
             Duration::try_from(start.duration_since(now)).unwrap_or(Duration::ZERO)
         });

@@ -29,7 +29,7 @@ use std::{
 pub const DEFAULT_FILE: &str = "faceoff.toml";
 
 /// The defaults with units and meanings, written by `faceoff init`.
-pub const COMMENTED: &str = include_str!("config/faceoff.toml");
+pub const COMMENTED_DEFAULTS: &str = include_str!("config/faceoff.toml");
 
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -82,7 +82,7 @@ pub struct ServerConfig {
     /// Address of metrics and health checks without a token; left out: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub metrics_listen: Option<SocketAddr>,
-    /// Folder of the database, the artifacts and the organiser's token.
+    /// Folder of the database, the artifacts and the host's token.
     pub data_dir: PathBuf,
     /// Bytes that must stay free on the disks of `data_dir` and `workers.scratch_dir`; below, the queue
     /// pauses and uploads are refused. 0: never.

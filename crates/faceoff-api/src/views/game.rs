@@ -119,7 +119,8 @@ pub enum GameStatus {
         result: Box<GameResultView>,
     },
     /// A platform fault. No result until the game is rerun.
-    Broken {
+    #[serde(rename = "broken")]
+    PlatformFailed {
         /// When the game was given up.
         at: Timestamp,
         /// What went wrong.

@@ -8,7 +8,9 @@ use crate::{
     problem::{Problem, ProblemKind},
 };
 use faceoff_api::token::{Secret, SecretKind};
-use faceoff_store::{CreatedCredentials, NewToken, Requester, SESSION_LIFETIME, TokenKind, TokenOwner};
+use faceoff_store::{
+    CreatedCredentials, NewToken, Requester, SESSION_LIFETIME, TokenKind, TokenOwner,
+};
 use faceoff_types::UserId;
 use jiff::Timestamp;
 

@@ -191,7 +191,11 @@ pub async fn revoke_token(
         _ => false,
     };
     let now = app.config.clock.now();
-    let default = if is_own { CreatedWithToken::Keep } else { CreatedWithToken::End };
+    let default = if is_own {
+        CreatedWithToken::Keep
+    } else {
+        CreatedWithToken::End
+    };
     let made = match made.unwrap_or(default) {
         CreatedWithToken::Keep => CreatedCredentials::Keep,
         CreatedWithToken::End => CreatedCredentials::EndExcept(Some(caller.token.id)),

@@ -166,7 +166,7 @@ fn status(state: &TournamentState, viewer: Viewer, game: &Game) -> Result<GameSt
                 result: Box::new(result_view(&score, &played, recording)),
             }
         }
-        GameState::PlatformFailed { at, reason } => GameStatus::Broken {
+        GameState::PlatformFailed { at, reason } => GameStatus::PlatformFailed {
             at: *at,
             reason: printable(reason.clone()),
         },

@@ -346,7 +346,8 @@ async fn slot_time_is_equal_for_waiting_teams() {
 async fn running_jobs_count_as_slot_time() {
     let mut s = Slots::new(4).await;
     s.queue_evaluations(&[("A", 9), ("B", 9), ("C", 9)]).await;
-    s.run(|_, _| 1000, |job_records| job_records.len() == 6).await;
+    s.run(|_, _| 1000, |job_records| job_records.len() == 6)
+        .await;
     let mut first_teams: Vec<_> = s.job_records[..3].iter().map(|job| job.team).collect();
     first_teams.sort_unstable();
     assert_eq!(first_teams, ["A", "B", "C"]);
@@ -365,10 +366,12 @@ async fn running_jobs_count_as_slot_time() {
 async fn slot_time_credit_expires_after_a_pause() {
     let mut s = Slots::new(1).await;
     s.queue_evaluations(&[("Busy", 60)]).await;
-    s.run(|_, _| 60, |job_records| job_records.len() == 30).await;
+    s.run(|_, _| 60, |job_records| job_records.len() == 30)
+        .await;
     // From now on two teams share equally: the new team does not catch up on the half hour that it had no jobs.
     s.queue_evaluations(&[("New", 30)]).await;
-    s.run(|_, _| 60, |job_records| job_records.len() == 50).await;
+    s.run(|_, _| 60, |job_records| job_records.len() == 50)
+        .await;
     let with_new = &s.job_records[30..];
     let sequences = with_new.chunk_by(|a, b| a.team == b.team).map(<[_]>::len);
     assert_eq!(
@@ -382,7 +385,8 @@ async fn slot_time_credit_expires_after_a_pause() {
     for _ in 0..10 {
         s.f.upload(&third).await;
     }
-    s.run(|_, _| 60, |job_records| job_records.len() == 70).await;
+    s.run(|_, _| 60, |job_records| job_records.len() == 70)
+        .await;
     let with_third = &s.job_records[50..];
     let sequences = with_third.chunk_by(|a, b| a.kind == b.kind).map(<[_]>::len);
     assert_eq!(

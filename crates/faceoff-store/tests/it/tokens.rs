@@ -182,7 +182,12 @@ async fn host_token_follows_its_file_and_stays_revoked() {
     rotate(other_host_token.id, 9).await.unwrap();
     assert!(!f.store.set_host_token([1; 32], f.now).await.unwrap());
     f.store
-        .revoke_token(Actor::Host, other_host_token.id, CreatedCredentials::Keep, f.now)
+        .revoke_token(
+            Actor::Host,
+            other_host_token.id,
+            CreatedCredentials::Keep,
+            f.now,
+        )
         .await
         .unwrap();
     assert!(!f.store.set_host_token([9; 32], f.now).await.unwrap());
@@ -457,7 +462,12 @@ async fn ended_credentials_are_deleted_after_a_month() {
     assert!(!f.store.set_host_token([7; 32], f.now).await.unwrap());
     // A token that was created with a deleted token still ends with the token with which the deleted one was created.
     f.store
-        .revoke_token(Actor::Host, root, CreatedCredentials::EndExcept(None), f.now)
+        .revoke_token(
+            Actor::Host,
+            root,
+            CreatedCredentials::EndExcept(None),
+            f.now,
+        )
         .await
         .unwrap();
     assert_eq!(rejection(&f, 3).await, Some(TokenRejection::Revoked(f.now)));

@@ -113,7 +113,10 @@ async fn claim_game(f: &TestStore) -> (JobClaim, GameId, u32) {
 async fn run_next_game(f: &TestStore) -> GameId {
     let (claim, game, _) = claim_game(f).await;
     let recorded = f.store.game(game).await.unwrap().purpose.keeps_recording();
-    let committed = f.store.commit_game(&claim, &game_commit(recorded), f.now).await;
+    let committed = f
+        .store
+        .commit_game(&claim, &game_commit(recorded), f.now)
+        .await;
     assert_eq!(committed.unwrap(), CommitOutcome::Stored);
     game
 }
@@ -670,7 +673,9 @@ async fn cancelled_game_of_an_earlier_round_is_not_waited_for() {
         .await
         .unwrap();
     let request = departure(c, DepartureKind::Disqualified, None);
-    let left = f.store.leave_tournament(Actor::Host, cup.id, &request, f.now);
+    let left = f
+        .store
+        .leave_tournament(Actor::Host, cup.id, &request, f.now);
     assert_eq!(left.await.unwrap().unwrap().from_round, round(2));
     assert!(matches!(
         state(&f, of_c.id).await,
@@ -1035,7 +1040,10 @@ async fn closed_tournament_is_final_and_frees_bundles() {
         settings: TournamentSettings::default(),
         entrants: Vec::new(),
     };
-    let taken = f.store.open_tournament(Actor::Host, &same_name, f.now).await;
+    let taken = f
+        .store
+        .open_tournament(Actor::Host, &same_name, f.now)
+        .await;
     assert!(
         matches!(taken, Err(StoreError::TournamentNameTaken(_))),
         "{taken:?}"

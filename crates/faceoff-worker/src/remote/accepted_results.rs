@@ -82,7 +82,9 @@ impl Dispatcher {
                 .max_messages(MAX_CONCURRENT_CHECKS - checks.len())
                 .expires(POLL_INTERVAL)
                 .messages();
-            let mut results = with_nats_timeout(results).await?.context("fetching results")?;
+            let mut results = with_nats_timeout(results)
+                .await?
+                .context("fetching results")?;
             let mut is_empty = true;
             while let Some(message) = with_nats_timeout(results.next()).await? {
                 is_empty = false;

@@ -5,7 +5,7 @@ use super::{
     bucket::{Bucket, BucketConfig},
     connection::NatsConfig,
     grants::grant_for,
-    names::{ALL, Names, SERVER, NOT_STARTED},
+    names::{ALL, NOT_STARTED, Names, SERVER},
     pending_results::PendingResults,
     published_jobs::{PublishedJob, PublishedJobs},
     requests::RequestHandler,

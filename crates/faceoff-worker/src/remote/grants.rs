@@ -103,7 +103,9 @@ pub(super) fn store_result(
 ) -> anyhow::Result<Acceptance> {
     let ResultMessage { lease, end, .. } = message;
     let released = match end {
-        RemoteJobEnd::Done { report } => return store_report(server, checks, grant, &lease, *report),
+        RemoteJobEnd::Done { report } => {
+            return store_report(server, checks, grant, &lease, *report);
+        }
         RemoteJobEnd::Interrupted => server.release(&lease, ReleaseReason::Interrupted),
         RemoteJobEnd::FullDisk => server.release(&lease, ReleaseReason::FullDisk),
         RemoteJobEnd::PlatformFault { reason } => {

@@ -7,7 +7,7 @@ use super::{
 };
 use anyhow::Context as _;
 use async_nats::jetstream::{Message, consumer::PullConsumer};
-use faceoff_wire::remote::{RemoteJobEnd, RemoteJob, WorkerRequest, WorkerResponse};
+use faceoff_wire::remote::{RemoteJob, RemoteJobEnd, WorkerRequest, WorkerResponse};
 use futures::StreamExt as _;
 use std::{
     sync::PoisonError,

@@ -2,7 +2,7 @@
 
 use super::{
     compatibility::incompatibility,
-    names::{self, ALL, Names, NOT_STARTED},
+    names::{self, ALL, NOT_STARTED, Names},
     pending_results::PendingResults,
     published_jobs::PublishedJobs,
     streams::Streams,
@@ -179,7 +179,8 @@ impl RequestHandler {
                 episodes_done,
                 send_problem,
             } => {
-                let send_problem = send_problem.map(|problem| printable_excerpt(&problem, MAX_PROBLEM_CHARS));
+                let send_problem =
+                    send_problem.map(|problem| printable_excerpt(&problem, MAX_PROBLEM_CHARS));
                 let held = self.renew(&worker, &lease, episodes_done, renewals).await;
                 self.record_renewal(&worker, &lease, held, send_problem.as_deref())
             }

@@ -12,7 +12,9 @@ use faceoff_dataset::CLIPS_FILE;
 use faceoff_types::{BundleRef, GameId};
 use faceoff_wire::{
     job::{JobReport, Lease},
-    remote::{RemoteJobEnd, LiveGameMessage, LiveGameUpdate, RemoteJob, WorkerRequest, WorkerResponse},
+    remote::{
+        LiveGameMessage, LiveGameUpdate, RemoteJob, RemoteJobEnd, WorkerRequest, WorkerResponse,
+    },
 };
 use std::{
     path::Path,
@@ -93,7 +95,9 @@ impl ServerClient {
 
     async fn store_file(&self, name: &str, file: &Path) -> anyhow::Result<()> {
         let (files, transfer) = (self.files(), &self.link.file_transfer);
-        files.store(transfer, name, file, || self.must_stop_job()).await
+        files
+            .store(transfer, name, file, || self.must_stop_job())
+            .await
     }
 
     /// Waits for [`RETRY_INTERVAL`], or until the shutdown.

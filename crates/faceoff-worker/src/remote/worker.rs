@@ -34,8 +34,8 @@ pub struct RemoteWorkerConfig {
     pub capabilities: WorkerCapabilities,
     /// HTTP client for files. It has no timeout of its own, since transfers are monitored for progress.
     pub http: reqwest::Client,
-    /// Idle time after which the worker ends; `None`: never.
-    pub ends_after: Option<Duration>,
+    /// Idle time after which the worker exits; `None`: never.
+    pub exit_after_idle: Option<Duration>,
     pub slots: SlotsConfig,
 }
 
@@ -80,13 +80,13 @@ pub async fn run_remote_worker(
         busy_at: Mutex::new(Instant::now()),
         registered_at: Mutex::default(),
     });
-    if let Some(ends_after) = config.ends_after {
+    if let Some(exit_after_idle) = config.exit_after_idle {
         let (link, shutdown) = (Arc::clone(&link), shutdown.clone());
         tokio::spawn(async move {
-            while link.idle_for() < ends_after {
-                tokio::time::sleep(IDLE_CHECK_INTERVAL.min(ends_after)).await;
+            while link.idle_for() < exit_after_idle {
+                tokio::time::sleep(IDLE_CHECK_INTERVAL.min(exit_after_idle)).await;
             }
-            tracing::info!(?ends_after, "ending: idle");
+            tracing::info!(ends_after = ?exit_after_idle, "ending: idle");
             shutdown.cancel();
         });
     }

@@ -400,7 +400,11 @@ impl Server {
             .local_server(self.store.clone(), self.live.clone(), self.clock())
     }
 
-    pub(super) fn start_slots(&self, slots: usize, evaluator: &Arc<ScriptedEvaluator>) -> RunningSlots {
+    pub(super) fn start_slots(
+        &self,
+        slots: usize,
+        evaluator: &Arc<ScriptedEvaluator>,
+    ) -> RunningSlots {
         self.start_intercepted_slots(slots, evaluator, |server| Arc::new(server))
     }
 

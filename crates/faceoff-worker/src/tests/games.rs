@@ -300,16 +300,17 @@ async fn lost_commit_response_keeps_result_and_recording() {
         .await
         .id;
     let commits = Arc::new(AtomicU32::new(0));
-    let running = server.start_intercepted_slots(1, &ScriptedEvaluator::with_game(|_, _| Ok(())), |local| {
-        let commits = Arc::clone(&commits);
-        InterceptedServer::shared(local, move |interception| match interception {
-            Interception::Committed(_) => {
-                commits.fetch_add(1, Ordering::SeqCst);
-                anyhow::bail!("the connection broke")
-            }
-            Interception::Releasing => Ok(()),
-        })
-    });
+    let running =
+        server.start_intercepted_slots(1, &ScriptedEvaluator::with_game(|_, _| Ok(())), |local| {
+            let commits = Arc::clone(&commits);
+            InterceptedServer::shared(local, move |interception| match interception {
+                Interception::Committed(_) => {
+                    commits.fetch_add(1, Ordering::SeqCst);
+                    anyhow::bail!("the connection broke")
+                }
+                Interception::Releasing => Ok(()),
+            })
+        });
     let result = wait_for_result(&server, game).await;
     running.stop().await;
     assert_eq!(commits.load(Ordering::SeqCst), 1);

@@ -252,8 +252,8 @@ impl Client {
             .await
     }
 
-    /// Team: changes the description of a submission.
-    pub async fn describe(
+    /// Team: changes the label or the note of a submission.
+    pub async fn change_submission(
         &self,
         id: SubmissionId,
         change: &SubmissionChange,

@@ -3,9 +3,9 @@
 use super::{Client, read_json};
 use faceoff_api::{
     requests::{
-        Confirmation, Decision, JoinRequest, CreatedWithToken, NewAnnouncement, NewAnswer, NewInvitation,
-        NewPassword, NewQuestion, NewTeam, NewTerms, NewToken, Reason, RegistrationRequest,
-        RevocationQuery, SeasonChange, TeamChange, UserChange,
+        Confirmation, CreatedWithToken, Decision, JoinRequest, NewAnnouncement, NewAnswer,
+        NewInvitation, NewPassword, NewQuestion, NewTeam, NewTerms, NewToken, Reason,
+        RegistrationRequest, RevocationQuery, SeasonChange, TeamChange, UserChange,
     },
     views::{
         announcement::{AnnouncementView, QuestionView, TermsView},

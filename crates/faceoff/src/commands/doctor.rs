@@ -16,7 +16,7 @@ use anyhow::{Context as _, bail};
 use check::Check;
 use clap::Args;
 use faceoff_sandbox::{
-    LayerProbe, Layer, MEMORY_FOLDER, MemoryImage, MemoryImageError, probe_host,
+    Layer, LayerProbe, MEMORY_FOLDER, MemoryImage, MemoryImageError, probe_host,
 };
 use faceoff_store::FreeSpace;
 use runtimes::{RuntimeReport, runtime_reports};

@@ -107,7 +107,7 @@ async fn print_validation(client: &Client, submission: &SubmissionView) -> anyho
             let agent = submission.agent_name.as_deref().unwrap_or("the agent");
             print_log(log.as_deref());
             println!("valid: {agent} starts, responds and meets the time limits");
-            // The submission is valid, whatever becomes of this question.
+            // If this request fails, the submission is still valid.
             match retry_temporary(RETRY_TIMEOUT, async || client.me().await).await {
                 Ok(me) => println!("{}", next_cutoff_text(&me, submission.id)),
                 Err(error) => eprintln!("the next cutoff is not known: {error:#}"),

@@ -4,7 +4,7 @@
 use super::{
     capabilities::own_capabilities,
     files_client::files_client,
-    serve::{check_sandbox, hold_in_memory},
+    serve::{check_sandbox, copy_to_memory},
 };
 use crate::{config::Config, log::LogFormat};
 use anyhow::{Context as _, anyhow};
@@ -98,8 +98,8 @@ impl WorkerCommand {
         );
         capabilities.labels = self.labels;
         let http = files_client(config.nats.ca_file.as_deref())?;
-        // Kept as long as agents run.
-        let _image = hold_in_memory(&mut agent.runtimes, config.sandbox.resident_bytes);
+        // The runtimes' files in memory, kept as long as agents run.
+        let _memory_copy = copy_to_memory(&mut agent.runtimes, config.sandbox.resident_bytes);
         let scratch_dir = config.scratch_dir();
         fs::create_dir_all(&scratch_dir)
             .with_context(|| format!("creating the folder {}", scratch_dir.display()))?;
@@ -108,7 +108,7 @@ impl WorkerCommand {
             name,
             capabilities,
             http,
-            ends_after: self.drain_after_idle.map(SignedDuration::unsigned_abs),
+            exit_after_idle: self.drain_after_idle.map(SignedDuration::unsigned_abs),
             slots: SlotsConfig {
                 cpus: CpuLayout::for_server(config.slots(), &config.workers.agent_cpus),
                 threads: SlotThreads::from_caller(),

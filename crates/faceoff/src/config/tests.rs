@@ -156,13 +156,16 @@ fn error_names_the_field() {
 #[test]
 fn commented_file_has_the_defaults_and_is_documented() {
     // Values without a fixed default are comments in the file.
-    assert_eq!(Config::parse(COMMENTED).unwrap(), Config::default());
+    assert_eq!(
+        Config::parse(COMMENTED_DEFAULTS).unwrap(),
+        Config::default()
+    );
     let documentation = include_str!("../../../../docs/configuration.md");
     let block = documentation
         .split("```toml\n")
         .nth(1)
         .and_then(|rest| rest.split("```").next());
-    assert_eq!(block, Some(COMMENTED));
+    assert_eq!(block, Some(COMMENTED_DEFAULTS));
 }
 
 #[test]
@@ -184,7 +187,7 @@ fn commented_file_explains_all_values() {
         assert_eq!(old_value, None, "{name}");
     }
     for (section, values) in &written {
-        let (_, rest) = COMMENTED
+        let (_, rest) = COMMENTED_DEFAULTS
             .split_once(&format!("\n[{section}"))
             .expect(section);
         let lines: Vec<&str> = rest

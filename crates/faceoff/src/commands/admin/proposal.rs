@@ -77,7 +77,11 @@ pub(super) enum ProposalAction {
     },
 }
 
-pub(super) async fn act(client: &Client, json: bool, action: ProposalAction) -> anyhow::Result<()> {
+pub(super) async fn run_action(
+    client: &Client,
+    json: bool,
+    action: ProposalAction,
+) -> anyhow::Result<()> {
     let proposal_view = match action {
         ProposalAction::List => {
             let all = client.proposals().await?;

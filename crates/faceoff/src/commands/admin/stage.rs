@@ -133,7 +133,11 @@ fn parse_time(text: &str, zone: &IanaTimeZone) -> anyhow::Result<Timestamp> {
         .timestamp())
 }
 
-pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> anyhow::Result<()> {
+pub(super) async fn run_action(
+    client: &Client,
+    json: bool,
+    action: StageAction,
+) -> anyhow::Result<()> {
     match action {
         StageAction::List => {
             let stages = client.stages().await?;

@@ -52,7 +52,9 @@ pub(in crate::commands) async fn download(
     };
     print_download(json, async |bar| {
         let expected_blake3 = dataset_blake3.as_deref();
-        client.download_dataset(id, file, expected_blake3, bar).await
+        client
+            .download_dataset(id, file, expected_blake3, bar)
+            .await
     })
     .await
 }

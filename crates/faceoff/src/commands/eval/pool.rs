@@ -40,15 +40,9 @@ pub(super) enum EvalOutcome {
         logs: Logs,
     },
     /// The agent had more faults than allowed.
-    Failed {
-        faults: Vec<AgentFault>,
-        logs: Logs,
-    },
+    Failed { faults: Vec<AgentFault>, logs: Logs },
     /// A start of the agent timed out before any of its processes had answered.
-    NeverAnswered {
-        fault: AgentFault,
-        logs: Logs,
-    },
+    NeverAnswered { fault: AgentFault, logs: Logs },
 }
 
 /// State that the worker threads share.

@@ -3,7 +3,7 @@
 use super::{
     files::{LOG, RESULTS, remove_earlier, write_json},
     logs::Logs,
-    pool::{Job, EvalOutcome, run_shards},
+    pool::{EvalOutcome, Job, run_shards},
 };
 use crate::{
     commands::{notes::Notes, silence},

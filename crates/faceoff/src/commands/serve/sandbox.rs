@@ -1,7 +1,7 @@
 //! The sandbox of agents on this host: which of its layers the host has, and a copy of the runtimes' files in memory.
 
 use anyhow::bail;
-use faceoff_sandbox::{LayerProbe, Layer, MemoryImage, Runtime};
+use faceoff_sandbox::{Layer, LayerProbe, MemoryImage, Runtime};
 use std::collections::BTreeMap;
 
 /// Refuses a host that lacks a *layer* (one protection) of the sandbox which the configuration does not give up.
@@ -30,8 +30,8 @@ pub fn check_sandbox(features: &[LayerProbe], given_up: &[Layer]) -> anyhow::Res
     )
 }
 
-/// Lets agents use a copy of the runtimes' files in memory, if it fits.
-pub fn hold_in_memory(
+/// Copies the runtimes' files to memory for agents, if they fit. Returns the guard of the copy.
+pub fn copy_to_memory(
     runtimes: &mut BTreeMap<String, Runtime>,
     limit_bytes: u64,
 ) -> Option<MemoryImage> {

@@ -65,7 +65,7 @@ fn state_text(game: &GameView) -> String {
     let mut text = match &game.status {
         GameStatus::Queued => "queued".to_owned(),
         GameStatus::Running { attempt, .. } => format!("running, attempt {attempt}"),
-        GameStatus::Broken { reason, .. } => format!("platform fault: {reason}"),
+        GameStatus::PlatformFailed { reason, .. } => format!("platform fault: {reason}"),
         GameStatus::Void { reason, .. } => format!("void: {reason}"),
         GameStatus::Cancelled { reason, .. } => format!("cancelled: {reason}"),
         GameStatus::Played { result, .. } => {
@@ -140,10 +140,10 @@ pub(in crate::commands) fn attempts_text(attempts: &[GameAttemptView]) -> String
             (Some(end), Some(ended_at)) => {
                 let outcome = match end {
                     AttemptOutcomeView::Played => "finished",
-                    AttemptOutcomeView::Broken => "platform fault",
-                    AttemptOutcomeView::GivenBack => "released by its slot",
+                    AttemptOutcomeView::PlatformFailed => "platform fault",
+                    AttemptOutcomeView::Released => "released by its slot",
                     AttemptOutcomeView::Lost => "lost with its slot",
-                    AttemptOutcomeView::CalledOff => "cancelled",
+                    AttemptOutcomeView::Cancelled => "cancelled",
                 };
                 format!("{outcome} {}", exact_time_text(ended_at))
             }
@@ -164,7 +164,7 @@ pub(in crate::commands) fn attempts_text(attempts: &[GameAttemptView]) -> String
 }
 
 /// The requested test games, and the teams without one.
-pub(in crate::commands) fn requested_text(view: &TestGamesView) -> String {
+pub(in crate::commands) fn test_games_text(view: &TestGamesView) -> String {
     let mut text = games_table(&view.queued);
     for team in &view.skipped {
         text.push_str(&format!("\n{}: none, {}", team.team_name, team.reason));

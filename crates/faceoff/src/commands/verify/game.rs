@@ -87,7 +87,7 @@ pub(super) fn describe(path: &Path, simulated: &SimulatedGame) -> String {
 }
 
 /// Refuses `--secret` for a game.
-pub(super) fn refuse_season(has_secret: bool) -> Result<(), Failure> {
+pub(super) fn refuse_secret(has_secret: bool) -> Result<(), Failure> {
     if has_secret {
         return Err(Failure::from(DatasetError::Foreign(
             "--secret checks the seeds of an evaluation; leave it out for a game".to_owned(),
