@@ -1,8 +1,7 @@
 //! Writes the table of characters that look alike, of Unicode's technical standard 39, for `src/look_alikes.rs`.
 //!
-//! The crate with the standard's tables has an address for each character and each text that it resembles, and for each address the program
-//! has an entry by which it is loaded. Numbers and one text are smaller (docs/contributing/building.md has figures), so the crate is used here
-//! only.
+//! The tables of the crate `unicode-security` contain pointers, each of which needs a relocation in the executable. Arrays of numbers and
+//! one string are smaller (docs/contributing/building.md has figures), so the crate is a build dependency only.
 
 use std::{env, error::Error, fs, path::PathBuf};
 use unicode_normalization::UnicodeNormalization;

@@ -56,7 +56,7 @@ def poll(read, is_done):
 
 
 class Server:
-    """The server as a child process, with the organiser's token."""
+    """The server as a child process, with the operator's token."""
 
     def __init__(self, folder: Path):
         config = folder / "faceoff.toml"

@@ -138,7 +138,7 @@ fn organiser_sign_in_needs_no_data_folder() {
     grace(&["admin", "teams", "--server", &server.url], "").expect_refusal(
         NOT_ALLOWED,
         &[
-            "reading the organiser's token from",
+            "reading the operator's token from",
             "--data-dir",
             "faceoff login",
         ],

@@ -108,7 +108,7 @@ pub fn admin_as(server: &Server, token: &str, args: &[&str]) -> CommandOutput {
     faceoff(&[&options[..], args].concat(), "")
 }
 
-/// `faceoff admin` with the token of the server's operator.
+/// `faceoff admin` with the operator's token.
 pub fn admin(server: &Server, args: &[&str]) -> CommandOutput {
     admin_as(server, &server.admin_token, args)
 }

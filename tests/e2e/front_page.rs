@@ -68,7 +68,7 @@ fn front_page_stays_still_for_reduced_motion() {
 }
 
 #[test]
-fn heads_of_the_board_explain_themselves() {
+fn board_column_heading_opens_its_explanation() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let (server, _) = evaluated_striker(scratch.path());
     let browser = Browser::start(scratch.path());

@@ -93,7 +93,8 @@ fn scratch_on_other_disk(folder: &Path) -> String {
     format!("scratch_dir = {:?}", folder.join("scratch"))
 }
 
-/// The file from which the agent, as its only slot has unpacked it, reads before which episodes to wait.
+/// The file `wait_before` in the folder into which the only slot has unpacked the agent. It names the episodes before which the
+/// agent waits.
 struct WaitFile(PathBuf);
 
 impl WaitFile {
@@ -378,8 +379,8 @@ fn validation_without_space_to_unpack_is_repeated() {
     assert_eq!(verdict["state"], "valid", "{verdict:#}");
 }
 
-/// Fills the disk while the agent waits before `episode`, such as `hit 1`, when `finished_episodes` have ended. Each task has
-/// four episodes in two shards (jobs).
+/// Fills the disk while the agent waits before the episode that `episodes` describes (content of the wait file, such as `hit 1`).
+/// `finished_episodes` is the number of episodes that have ended by then. Each task has four episodes in two shards (jobs).
 fn fill_disk_during_shard(episodes: &str, finished_episodes: u64) {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let setup = SmallDiskSetup::prepare(scratch.path(), &config(4 * MIB, ""), LogTarget::Test);

@@ -11,7 +11,7 @@ use std::{
     net::TcpStream,
 };
 
-/// Number of event streams that visitors may have at the same time: three quarters of all.
+/// Number of event streams that visitors may have open at the same time: three quarters of the server's 512.
 const MAX_STREAMS: usize = 384;
 
 /// A script that records each event stream that a page opens, and how many milliseconds it waits before it opens the next.

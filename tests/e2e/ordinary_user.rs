@@ -125,7 +125,7 @@ fn ordinary_user_evaluates_and_plays_own_agents() {
     let output = expect_success(&output);
     assert!(output.contains("cgroup-memory"), "{output}");
 
-    // A server does not run strangers' agents so.
+    // A server does not start without these layers, because it runs other people's agents.
     let output = home.run(&["serve", "--listen", "127.0.0.1:0"]);
     assert!(!output.status.success());
     let errors = String::from_utf8_lossy(&output.stderr);
@@ -152,7 +152,7 @@ fn other_teams_archives_need_namespaces() {
             "{errors}"
         );
     }
-    // One's own folder, in which programs run anyway.
+    // The own folder of the user, whose programs the user could also run without a sandbox.
     let args = ["eval", bundle, "--task", "hit", "--episodes", "1"];
     let output = expect_success(&home.run_without_bubblewrap(&args));
     assert!(output.contains("namespaces"), "{output}");
@@ -200,7 +200,7 @@ fn container_without_privileges_evaluates_own_agents() {
     let output = expect_success(&output.expect("the program starts"));
     assert!(output.contains("namespaces"), "{output}");
 
-    // In a user namespace in which no further one may be made, not as its root.
+    // As the root of a user namespace in which further user namespaces are forbidden.
     let forbidden = "exec unshare --user --map-root-user sh -ec \
         'echo 0 > /proc/sys/user/max_user_namespaces; exec unshare --user --map-user=1 true'";
     let nested = Command::new("sh").args(["-c", forbidden]).status();
@@ -221,7 +221,7 @@ fn container_without_privileges_evaluates_own_agents() {
 }
 
 #[test]
-fn doctor_names_the_cure_of_an_old_bubblewrap() {
+fn doctor_names_the_fix_of_an_old_bubblewrap() {
     let home = Home::create();
     let old = home.folder.path().join("bwrap");
     let script =

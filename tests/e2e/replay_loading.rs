@@ -27,8 +27,8 @@ const RECORD_LOADING: &str = "
     });
 ";
 
-/// Loads a page with replays and checks both.
-fn loads_calmly(page: &Page, url: &str, replays: usize) {
+/// Loads a page with replays. Asserts that it shows the still pictures before its script runs, and that its layout shifts little.
+fn assert_still_first_and_layout_stable(page: &Page, url: &str, replays: usize) {
     page.go_to(url);
     page.wait_until(&format!(
         "document.querySelectorAll('section.replay[data-state=ready]').length == {replays}"
@@ -72,8 +72,12 @@ fn replay_page_shows_a_still_first_and_keeps_its_layout() {
         let page = browser.open_in(view, &format!("{}/", server.url));
         page.before_scripts(RECORD_LOADING);
         let episode = format!("{}{evaluation}/episodes/defend/0", server.url);
-        loads_calmly(&page, &episode, 1);
-        loads_calmly(&page, &format!("{episode}/embed"), 1);
-        loads_calmly(&page, &format!("{}{comparison}/defend/1", server.url), 2);
+        assert_still_first_and_layout_stable(&page, &episode, 1);
+        assert_still_first_and_layout_stable(&page, &format!("{episode}/embed"), 1);
+        assert_still_first_and_layout_stable(
+            &page,
+            &format!("{}{comparison}/defend/1", server.url),
+            2,
+        );
     }
 }

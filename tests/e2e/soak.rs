@@ -1,7 +1,7 @@
-//! A soak test, a long run of everything at once: evaluations, valid and invalid uploads, visitors of pages and costly ones, tokens
-//! that are revoked, a remote worker that sends false results, a system clock that is set, a disk that fills up and is freed, and
-//! `kill -9`. At the end each result equals that of an undisturbed run, each upload has the right verdict, no revoked token was
-//! accepted, and no files are left over.
+//! A soak test, a long run of everything at once: evaluations, valid and invalid uploads, visitors who fetch ordinary and costly
+//! pages, tokens that are revoked, a remote worker that sends false results, a system clock that is set, a disk that fills up and
+//! is freed, and `kill -9`. At the end each result equals that of an undisturbed run, each upload has the right verdict, no revoked
+//! token was accepted, and no files are left over.
 #![expect(clippy::print_stdout, reason = "it prints a summary of its run")]
 
 use crate::{
@@ -274,7 +274,7 @@ impl SoakState {
     }
 }
 
-/// An evaluated team, with its bundle without pauses for the local evaluation.
+/// A team that the server evaluates. The local evaluation uses the bundle without pauses.
 struct Contestant {
     team: Team,
     submission: Value,

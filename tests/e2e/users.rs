@@ -544,6 +544,6 @@ fn server_start_replaces_revoked_operator_token() {
     fs::remove_file(&token_file).expect("the file can be removed");
     with_token_file(&server, &["people", "list"]).expect_refusal(
         NOT_ALLOWED,
-        &["reading the organiser's token from", "--data-dir"],
+        &["reading the operator's token from", "--data-dir"],
     );
 }

@@ -62,7 +62,7 @@ pub struct Server {
     log: Log,
     /// `http://127.0.0.1:PORT`
     pub url: String,
-    /// The organiser's bearer token.
+    /// The host's token, which has an organiser's rights.
     pub admin_token: String,
     client: Client,
 }
@@ -132,7 +132,7 @@ impl Server {
             panic!("the server ended with {status}:\n{}", log.into_text());
         };
         let admin_token = fs::read_to_string(data_dir(child.id()).join("admin-token"))
-            .expect("the server writes the organiser's token to its folder")
+            .expect("the server writes the operator's token to its folder")
             .trim()
             .to_owned();
         Self {

@@ -248,7 +248,7 @@ impl<S: GameSink> RunningGame<S> {
         let side_state = &mut self.sides[side];
         match response {
             Response::Answer { timing, .. } => {
-                let is_late = timing.computation_time_s > self.limits.in_time_s;
+                let is_late = timing.computation_time_s > self.limits.max_answer_s;
                 side_state.record_answer(timing, is_late);
                 if is_late {
                     Effect::Late

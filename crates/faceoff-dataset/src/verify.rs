@@ -65,7 +65,7 @@ pub fn verify(
     let manifest = dataset.manifest();
     let competition = simulator.competition();
     let tasks = competition
-        .played_tasks(&manifest.episodes)
+        .tasks_in_order(&manifest.episodes)
         .map_err(|unknown| DatasetError::Foreign(format!("{MANIFEST_FILE}: {unknown}")))?;
     if let Some(weights) = &manifest.variation.weights {
         let checked = weights.in_order(competition.task_names());

@@ -92,9 +92,9 @@ fn unpack_within<'a>(
             limits.packed_bytes
         )));
     }
-    let mut head = Vec::with_capacity(ArchiveFormat::LONGEST_MAGIC);
+    let mut head = Vec::with_capacity(ArchiveFormat::DETECTION_BYTES);
     (&mut file)
-        .take(ArchiveFormat::LONGEST_MAGIC as u64)
+        .take(ArchiveFormat::DETECTION_BYTES as u64)
         .read_to_end(&mut head)?;
     file.seek(SeekFrom::Start(0))?;
 

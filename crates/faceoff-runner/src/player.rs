@@ -117,7 +117,7 @@ impl<'a> Player<'a> {
             task,
             world_factory,
             session: None,
-            log: Log::new(env.limits.stderr_tail_bytes),
+            log: Log::new(env.limits.stderr_kept_bytes),
             reset_budget: ResetBudget::new(&env.time, episodes),
             monitor,
             reruns: Reruns {

@@ -127,7 +127,7 @@ pub fn validate_monitored(
         mismatch_seed: spec.mismatch_seed,
     })?;
     let mut timing = Vec::with_capacity(spec.tasks.len());
-    let mut log = Log::new(env.limits.stderr_tail_bytes);
+    let mut log = Log::new(env.limits.stderr_kept_bytes);
     for task in spec.tasks.iter().copied() {
         let TaskPlan { mut shards, steps } = TaskPlan::new(spec, task);
         let mut answers = Answers::default();

@@ -198,7 +198,7 @@ impl Launch {
             tree.call_handler_thread = Some(call_handler.start()?);
         }
         let mut stderr =
-            StderrLog::drain(log, spec.limits.stderr_tail_bytes).context(WATCH_ACTION)?;
+            StderrLog::drain(log, spec.limits.stderr_kept_bytes).context(WATCH_ACTION)?;
         if let Some(status) = &mut tree.status {
             match status.wait_for_child(Instant::now() + SET_UP_TIMEOUT)? {
                 Some(init) => tree.watch_init(init),

@@ -2,7 +2,7 @@
 
 use crate::{
     AgentProcess, Isolation, Layer, Limits, ReadLine, Runtime, SandboxError, SpawnError, SpawnSpec,
-    answered_calls, bubblewrap::Bubblewrap, bubblewrap_program::BubblewrapProgram, cures::cure,
+    answered_calls, bubblewrap::Bubblewrap, bubblewrap_program::BubblewrapProgram, fixes::fix,
 };
 use serde::Serialize;
 use std::{
@@ -20,19 +20,20 @@ const PROBE_OPEN_FILES: u32 = 61;
 
 /// Result of probing one layer.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct HostFeature {
+pub struct LayerProbe {
     /// The probed layer.
     pub layer: Layer,
     /// The probe succeeded.
     pub available: bool,
     /// The found feature, or the error.
     pub found: String,
-    /// The fix: how to provide the layer, as a command if possible; `None` if it is available.
-    pub cure: Option<String>,
+    /// How to provide the layer, as a command if possible; `None` if it is available.
+    #[serde(rename = "cure")]
+    pub fix: Option<String>,
 }
 
 /// Probes the host: starts a process for each layer. Used by `doctor` and at start-up.
-pub fn probe_host() -> Vec<HostFeature> {
+pub fn probe_host() -> Vec<LayerProbe> {
     Layer::ALL.into_iter().map(probe).collect()
 }
 
@@ -40,7 +41,7 @@ pub fn probe_host() -> Vec<HostFeature> {
 ///
 /// # Errors
 /// If not even a process without any layer can be started: then the cause is none of the layers.
-pub fn unavailable_layers(layers: &[Layer]) -> Result<Vec<HostFeature>, String> {
+pub fn unavailable_layers(layers: &[Layer]) -> Result<Vec<LayerProbe>, String> {
     if run(layers, "cat", &["/dev/null"]).is_ok() {
         return Ok(Vec::new());
     }
@@ -49,7 +50,7 @@ pub fn unavailable_layers(layers: &[Layer]) -> Result<Vec<HostFeature>, String> 
     Ok(probed.filter(|feature| !feature.available).collect())
 }
 
-fn probe(layer: Layer) -> HostFeature {
+fn probe(layer: Layer) -> LayerProbe {
     let result = match layer {
         Layer::Namespaces => probe_namespaces(),
         Layer::Seccomp => probe_seccomp(),
@@ -62,16 +63,16 @@ fn probe(layer: Layer) -> HostFeature {
         }),
     };
     match result {
-        Ok(found) => HostFeature {
+        Ok(found) => LayerProbe {
             layer,
             available: true,
             found,
-            cure: None,
+            fix: None,
         },
-        Err(error) => HostFeature {
+        Err(error) => LayerProbe {
             layer,
             available: false,
-            cure: Some(cure(layer, &error)),
+            fix: Some(fix(layer, &error)),
             found: error,
         },
     }
@@ -84,7 +85,7 @@ fn field<'a>(text: &'a str, name: &str) -> Option<&'a str> {
 }
 
 fn probe_namespaces() -> Result<String, String> {
-    // Its cure is reported separately.
+    // Its fix is reported separately.
     BubblewrapProgram::find().map_err(|problem| problem.to_string())?;
     let bubblewrap = Bubblewrap::find().map_err(|error| error.to_string())?;
     // Inside, the process is the second one, has no capabilities, and sees only its own network.

@@ -19,7 +19,7 @@ pub enum AgentTask {
 }
 
 impl AgentTask {
-    /// The name of games where others have the name of a task. No competition has a task of this name.
+    /// The name that games have in place of a task's name, in the protocol and in files. No competition has a task of this name.
     pub const GAME: Task = Task::new("tournament");
 
     /// The name in the protocol: that of the task, or [`Self::GAME`].

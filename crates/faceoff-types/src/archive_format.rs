@@ -16,7 +16,7 @@ pub enum ArchiveFormat {
 impl ArchiveFormat {
     /// Number of bytes from an archive's start that suffice to detect every format. All but [`Self::Tar`] need only
     /// four, so [`Self::detect`] also accepts fewer.
-    pub const LONGEST_MAGIC: usize = TAR_MAGIC_OFFSET + TAR_MAGIC.len();
+    pub const DETECTION_BYTES: usize = TAR_MAGIC_OFFSET + TAR_MAGIC.len();
 
     /// Detects the format from an archive's first bytes; file names are not trusted.
     #[must_use]
@@ -28,7 +28,7 @@ impl ArchiveFormat {
                 Some(Self::TarZst)
             }
             [b'P', b'K', 3, 4, ..] => Some(Self::Zip),
-            _ => (head.get(TAR_MAGIC_OFFSET..Self::LONGEST_MAGIC) == Some(TAR_MAGIC))
+            _ => (head.get(TAR_MAGIC_OFFSET..Self::DETECTION_BYTES) == Some(TAR_MAGIC))
                 .then_some(Self::Tar),
         }
     }
@@ -46,7 +46,7 @@ impl ArchiveFormat {
 
     /// Accepted file extensions, with the dot.
     #[must_use]
-    pub const fn names(self) -> &'static [&'static str] {
+    pub const fn accepted_extensions(self) -> &'static [&'static str] {
         match self {
             Self::TarGz => &[".tar.gz", ".tgz"],
             Self::TarZst => &[".tar.zst", ".tzst"],
@@ -87,10 +87,10 @@ mod tests {
             let detect = |bytes: usize| ArchiveFormat::detect(&head[..bytes]);
             assert_eq!(detect(512), Some(ArchiveFormat::Tar));
             assert_eq!(
-                detect(ArchiveFormat::LONGEST_MAGIC),
+                detect(ArchiveFormat::DETECTION_BYTES),
                 Some(ArchiveFormat::Tar)
             );
-            assert_eq!(detect(ArchiveFormat::LONGEST_MAGIC - 1), None);
+            assert_eq!(detect(ArchiveFormat::DETECTION_BYTES - 1), None);
         }
         assert_eq!(ArchiveFormat::detect(&[0; 512]), None);
     }

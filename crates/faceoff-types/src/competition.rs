@@ -410,12 +410,12 @@ impl Competition {
     ///
     /// # Errors
     /// If the competition does not have a task of the map.
-    pub fn played_tasks<V>(&self, map: &TaskMap<V>) -> Result<Vec<Task>, UnknownTask> {
+    pub fn tasks_in_order<V>(&self, map: &TaskMap<V>) -> Result<Vec<Task>, UnknownTask> {
         for task in map.keys() {
             self.find_task(task.as_str())?;
         }
-        let is_played = |task: &Task| map.contains_key(task);
-        Ok(self.task_names().filter(is_played).collect())
+        let is_in_map = |task: &Task| map.contains_key(task);
+        Ok(self.task_names().filter(is_in_map).collect())
     }
 
     /// Control steps of the longest episode of a task; 0 if the competition has no such task.
@@ -441,7 +441,7 @@ impl Competition {
 
     /// Control steps of the longest episode.
     #[must_use]
-    pub fn longest_episode(&self) -> u32 {
+    pub fn longest_episode_steps(&self) -> u32 {
         let steps = self.tasks.iter().map(|info| info.max_steps);
         steps.max().unwrap_or_default()
     }

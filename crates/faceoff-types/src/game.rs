@@ -28,9 +28,9 @@ pub enum ForfeitScore {
 }
 
 impl ForfeitScore {
-    /// Is it the rule of earlier versions, which files do not state?
+    /// Is it the rule of earlier versions, which is left out of JSON?
     #[must_use]
-    pub const fn is_first(&self) -> bool {
+    pub const fn is_legacy(&self) -> bool {
         matches!(self, Self::Ten)
     }
 }

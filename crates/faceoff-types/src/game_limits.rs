@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 #[serde(default, deny_unknown_fields)]
 pub struct GameLimits {
     /// Longest time of an answer that still takes effect, in seconds.
-    pub in_time_s: f64,
+    #[serde(rename = "in_time_s")]
+    pub max_answer_s: f64,
     /// Faults allowed; one more forfeits the game.
     pub max_faults: u32,
     /// Total time for the answers, start-ups and resets of a side, in seconds; exceeding it forfeits the game.
@@ -20,7 +21,7 @@ pub struct GameLimits {
 impl Default for GameLimits {
     fn default() -> Self {
         Self {
-            in_time_s: 0.02,
+            max_answer_s: 0.02,
             max_faults: 10,
             total_s: 3600.0,
             restart_s: 10.0,

@@ -63,7 +63,8 @@ pub struct ResourceLimits {
     /// CPUs: seconds of CPU time per second, enforced every 10 ms by the cgroup's quota.
     pub cpus: f64,
     /// Size of the stored part of standard error, in bytes: its beginning and its end.
-    pub stderr_tail_bytes: u64,
+    #[serde(rename = "stderr_tail_bytes")]
+    pub stderr_kept_bytes: u64,
 }
 
 impl Default for ResourceLimits {
@@ -76,7 +77,7 @@ impl Default for ResourceLimits {
             open_files: 1024,
             file_size_bytes: 256 << 20,
             cpus: 1.0,
-            stderr_tail_bytes: 64 << 10,
+            stderr_kept_bytes: 64 << 10,
         }
     }
 }

@@ -1,6 +1,5 @@
 //! Magnitudes of the perturbations, such as the size of noise: values by group (the perturbation that they belong to) and name.
-//! Which there are, and in which range, is known to
-//! [`Competition`](crate::Competition).
+//! [`Competition`](crate::Competition) defines which magnitudes exist, and their ranges.
 
 use indexmap::IndexMap;
 use serde::{

@@ -7,7 +7,6 @@ use indexmap::IndexMap;
 pub type ProfileMap<V> = IndexMap<Profile, V>;
 
 short_name! {
-    /// The name of a profile, a set of perturbations. Whether a competition has it is known to [`Competition`](crate::Competition), and
-    /// so is the order of profiles.
+    /// The name of a profile, a set of perturbations. [`Competition`](crate::Competition) defines which profiles exist, and their order.
     Profile, "a profile"
 }

@@ -4,7 +4,7 @@ use crate::short_name::short_name;
 
 short_name! {
     /// The name of the rules and the simulator behaviour that a published score refers to. Recordings and running evaluations keep the
-    /// ruleset that they started with. Which there are is known to [`Competition`](crate::Competition).
+    /// ruleset that they started with. [`Competition`](crate::Competition) defines which rulesets exist.
     Ruleset, "a ruleset", with_dots
 }
 

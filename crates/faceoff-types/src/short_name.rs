@@ -1,4 +1,4 @@
-//! Names that a competition gives to its things: short, and held in place.
+//! Short names of the tasks, profiles, rulesets and other parts of a competition. They are stored inline, without an allocation.
 
 use std::fmt;
 
@@ -47,7 +47,7 @@ impl fmt::Debug for ShortName {
     }
 }
 
-/// Text that is not the name of such a thing.
+/// Text that is not a valid short name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "{text:?} is not the name of {kind}: expected 1 to {MAX_LEN} of {}, with a letter first",

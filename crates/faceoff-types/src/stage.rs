@@ -58,7 +58,7 @@ pub struct StageRules {
     #[serde(flatten)]
     pub variation: Variation,
     /// Limits of agents that differ from the server's configuration; absent if none do.
-    #[serde(default, skip_serializing_if = "StageLimits::is_none")]
+    #[serde(default, skip_serializing_if = "StageLimits::is_empty")]
     pub limits: Box<StageLimits>,
     /// Runtimes that agents may use; absent: all that the server offers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -117,7 +117,7 @@ mod tests {
     fn rules_without_variation_round_trip_unchanged() {
         let text = r#"{"ruleset":"airhockey-2023.2","profile":"evaluation","tasks":["hit"],"episodes_per_task":4,"max_faults":1}"#;
         let rules: StageRules = serde_json::from_str(text).unwrap();
-        assert!(rules.variation.is_none());
+        assert!(rules.variation.is_empty());
         assert_eq!(serde_json::to_string(&rules).unwrap(), text);
     }
 }

@@ -58,7 +58,7 @@ pub struct InvalidLimit {
 impl StageLimits {
     /// Are all values those of the server's configuration?
     #[must_use]
-    pub fn is_none(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }
 
@@ -154,7 +154,7 @@ pub struct StageUploadLimits {
 impl StageUploadLimits {
     /// Are all values those of the server's configuration?
     #[must_use]
-    pub fn is_none(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }
 
@@ -187,7 +187,7 @@ mod tests {
     #[test]
     fn stage_limits_replace_only_their_counterparts() {
         let none: StageLimits = serde_json::from_str("{}").unwrap();
-        assert!(none.is_none());
+        assert!(none.is_empty());
         assert_eq!(serde_json::to_string(&none).unwrap(), "{}");
         let server = AgentLimits::default();
         assert_eq!(none.apply_to(&server), server);

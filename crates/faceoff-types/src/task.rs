@@ -17,7 +17,7 @@ pub const MAX_EPISODES_PER_TASK: u32 = 100_000;
 pub type TaskMap<V> = IndexMap<Task, V>;
 
 short_name! {
-    /// The name of a task. Whether a competition has it is known to [`Competition`](crate::Competition), and so is the order of tasks.
+    /// The name of a task. [`Competition`](crate::Competition) defines which tasks exist, and their order.
     Task, "a task"
 }
 

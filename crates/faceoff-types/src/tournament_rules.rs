@@ -34,10 +34,10 @@ pub struct TournamentRules {
     #[serde(default)]
     pub mirrored: bool,
     /// What a forfeited game counts; absent: 10 : 0.
-    #[serde(default, skip_serializing_if = "ForfeitScore::is_first")]
+    #[serde(default, skip_serializing_if = "ForfeitScore::is_legacy")]
     pub forfeit_score: ForfeitScore,
     /// When a withdrawal takes effect; absent: at once.
-    #[serde(default, skip_serializing_if = "Withdrawals::is_first")]
+    #[serde(default, skip_serializing_if = "Withdrawals::is_legacy")]
     pub withdrawals: Withdrawals,
     /// Limits of each side, in addition to those of single answers.
     #[serde(default)]
@@ -46,7 +46,7 @@ pub struct TournamentRules {
     #[serde(default, skip_serializing_if = "Magnitudes::is_empty")]
     pub perturbations: Magnitudes,
     /// Limits of agents that differ from the server's configuration; absent if none do.
-    #[serde(default, skip_serializing_if = "StageLimits::is_none")]
+    #[serde(default, skip_serializing_if = "StageLimits::is_empty")]
     pub limits: Box<StageLimits>,
     /// Runtimes that agents may use; absent: all that the server offers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -68,9 +68,9 @@ pub enum Withdrawals {
 }
 
 impl Withdrawals {
-    /// Is it the rule of earlier versions, which stored rules do not state?
+    /// Is it the rule of earlier versions, which is left out of JSON?
     #[must_use]
-    pub const fn is_first(&self) -> bool {
+    pub const fn is_legacy(&self) -> bool {
         matches!(self, Self::AtOnce)
     }
 }
@@ -81,7 +81,8 @@ impl Withdrawals {
 #[serde(default, deny_unknown_fields)]
 pub struct TournamentSettings {
     /// Test games (against a baseline) and friendly games (against another team) that a team may request per UTC day.
-    pub free_games_per_day: u32,
+    #[serde(rename = "free_games_per_day")]
+    pub test_and_friendly_games_per_day: u32,
     /// When the recordings of both sides become public: never, after the round (`at_release`), or when the tournament
     /// closes (`at_close`).
     pub publishes: Publication,
@@ -117,7 +118,7 @@ pub enum InvalidTournament {
     #[error("runtimes: {0}")]
     Runtimes(#[from] crate::InvalidRuntimes),
     #[error("free_games_per_day: expected 0 to {MAX_TEST_AND_FRIENDLY_GAMES}, got {0}")]
-    FreeGames(u32),
+    TestAndFriendlyGames(u32),
 }
 
 const fn default_steps() -> u32 {
@@ -145,7 +146,7 @@ impl TournamentRules {
 
     /// Does a team that leaves in this way play the round under way to its end?
     #[must_use]
-    pub fn plays_on(&self, departure: DepartureKind) -> bool {
+    pub fn finishes_round(&self, departure: DepartureKind) -> bool {
         departure == DepartureKind::Withdrawn && self.withdrawals == Withdrawals::AfterRound
     }
 
@@ -166,14 +167,13 @@ impl TournamentRules {
             }
         }
         let GameLimits {
-            // Longest time of an answer that still takes effect.
-            in_time_s,
+            max_answer_s,
             total_s,
             restart_s,
             max_faults: _,
         } = self.game_limits;
         for (field, got, most, expected) in [
-            ("in_time_s", in_time_s, 1.0, "above 0, at most 1"),
+            ("in_time_s", max_answer_s, 1.0, "above 0, at most 1"),
             ("total_s", total_s, 86_400.0, "above 0, at most 86400"),
             ("restart_s", restart_s, 600.0, "above 0, at most 600"),
         ] {
@@ -196,7 +196,7 @@ impl TournamentRules {
 impl Default for TournamentSettings {
     fn default() -> Self {
         Self {
-            free_games_per_day: 5,
+            test_and_friendly_games_per_day: 5,
             publishes: Publication::AtClose,
         }
     }
@@ -208,8 +208,10 @@ impl TournamentSettings {
     /// # Errors
     /// The first setting that is out of range.
     pub const fn check(&self) -> Result<(), InvalidTournament> {
-        if self.free_games_per_day > MAX_TEST_AND_FRIENDLY_GAMES {
-            return Err(InvalidTournament::FreeGames(self.free_games_per_day));
+        if self.test_and_friendly_games_per_day > MAX_TEST_AND_FRIENDLY_GAMES {
+            return Err(InvalidTournament::TestAndFriendlyGames(
+                self.test_and_friendly_games_per_day,
+            ));
         }
         Ok(())
     }
@@ -287,9 +289,12 @@ mod tests {
             assert!(rules(json).is_err(), "{json}");
         }
         let many = TournamentSettings {
-            free_games_per_day: MAX_TEST_AND_FRIENDLY_GAMES + 1,
+            test_and_friendly_games_per_day: MAX_TEST_AND_FRIENDLY_GAMES + 1,
             ..TournamentSettings::default()
         };
-        assert_eq!(many.check(), Err(InvalidTournament::FreeGames(1001)));
+        assert_eq!(
+            many.check(),
+            Err(InvalidTournament::TestAndFriendlyGames(1001))
+        );
     }
 }

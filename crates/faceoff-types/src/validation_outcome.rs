@@ -15,7 +15,7 @@ pub enum ValidationOutcome {
         agent_name: String,
         /// Answer times, one entry per task.
         timing: Vec<ValidationTiming>,
-        /// Tail of its standard error.
+        /// The stored part of its standard error: its beginning and its end.
         log: String,
     },
     /// The bundle is faulty, or the agent fails or is too slow.
@@ -28,7 +28,7 @@ pub enum ValidationOutcome {
         reason: String,
         /// Answer times of the tasks that were played.
         timing: Vec<ValidationTiming>,
-        /// Tail of its standard error.
+        /// The stored part of its standard error: its beginning and its end.
         log: String,
     },
 }

@@ -24,7 +24,7 @@ pub struct Variation {
 impl Variation {
     /// Is everything as in the ruleset?
     #[must_use]
-    pub fn is_none(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         is_default(self)
     }
 }
@@ -199,14 +199,14 @@ mod tests {
     fn ruleset_values_are_omitted_and_round_trip() {
         assert_eq!(serde_json::to_string(&Variation::default()).unwrap(), "{}");
         let read: Variation = serde_json::from_str("{}").unwrap();
-        assert!(read.is_none());
+        assert!(read.is_empty());
         let text = r#"{"weights":{"hit":0.5,"defend":0.25,"prepare":0.25},"tier_bounds":{"deployable":0.1,"improvable":2.0}}"#;
         let read: Variation = serde_json::from_str(text).unwrap();
-        assert!(!read.is_none());
+        assert!(!read.is_empty());
         assert_eq!(serde_json::to_string(&read).unwrap(), text);
         let no_losses = r#"{"perturbations":{"tracking_loss":{"probability":0.0}}}"#;
         let read: Variation = serde_json::from_str(no_losses).unwrap();
-        assert!(!read.is_none());
+        assert!(!read.is_empty());
         assert_eq!(serde_json::to_string(&read).unwrap(), no_losses);
     }
 

@@ -5,7 +5,7 @@ use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
 short_name! {
-    /// The name of a kind of violation. Which there are, and what they cost, is known to [`Competition`](crate::Competition).
+    /// The name of a kind of violation. [`Competition`](crate::Competition) defines which kinds exist, and what they cost.
     ViolationName, "a violation"
 }
 

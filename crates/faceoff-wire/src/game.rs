@@ -32,7 +32,7 @@ pub struct GameSpec {
     #[serde(default)]
     pub limits: GameLimits,
     /// What the game counts after a forfeit; absent: 10 : 0.
-    #[serde(default, skip_serializing_if = "ForfeitScore::is_first")]
+    #[serde(default, skip_serializing_if = "ForfeitScore::is_legacy")]
     pub forfeit_score: ForfeitScore,
     /// Number of earlier attempts that a platform fault (a failure that is not the agents') ended.
     #[serde(default)]

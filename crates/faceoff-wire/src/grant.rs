@@ -29,8 +29,8 @@ pub struct Grant {
     pub expected_recording: ExpectedRecording,
     /// BLAKE3 of the executable of the server that issued the job, 64 hexadecimal digits. A result from another executable is not
     /// comparable, so the job is run again.
-    #[serde(default)]
-    pub program: String,
+    #[serde(default, rename = "program")]
+    pub program_blake3: String,
 }
 
 /// The recording that a job is expected to store.
@@ -176,7 +176,7 @@ mod tests {
             }],
             write_scope: WriteScope::Folder("runs/r/n".into()),
             expected_recording: ExpectedRecording::None,
-            program: OTHER_BLAKE3.into(),
+            program_blake3: OTHER_BLAKE3.into(),
         }
     }
 

@@ -48,7 +48,8 @@ pub struct Lease {
     /// Random id of this lease; another lease of the same job has another nonce.
     pub nonce: Uuid,
     /// Name of the lease holder.
-    pub slot: String,
+    #[serde(rename = "slot")]
+    pub holder: String,
     /// The instant at which the lease ends unless it is renewed, by the server's clock.
     pub expires_at: Timestamp,
     /// Duration of the lease, and of each renewal, in seconds. Remote workers use it in place of `expires_at`, since
@@ -137,7 +138,8 @@ pub struct GameFiles {
 /// The episodes of a validation run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ValidationSpec {
-    /// The ruleset, as all that follows that of an evaluation: an agent cannot tell the runs apart.
+    /// The ruleset. Except for the seed, this and all other fields are as in an evaluation, so that an agent cannot distinguish a
+    /// validation run from an evaluation.
     pub ruleset: Ruleset,
     /// The perturbation profile.
     pub profile: Profile,
@@ -160,7 +162,7 @@ pub struct ValidationSpec {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ShardSpec {
     /// The ruleset; absent in recordings of the first ruleset.
-    #[serde(default = "first_ruleset")]
+    #[serde(default = "legacy_ruleset")]
     pub ruleset: Ruleset,
     /// The task.
     pub task: Task,
@@ -202,7 +204,7 @@ pub struct EvaluationMeta {
     pub task_weights: TaskWeights,
     /// The bounds of the competition's tiers, unless the variation has others; null: it has no tiers. Absent in jobs of earlier
     /// versions.
-    #[serde(default = "first_tiers")]
+    #[serde(default = "legacy_tiers")]
     pub tiers: Option<TierBounds>,
 }
 
@@ -215,16 +217,16 @@ impl EvaluationMeta {
     }
 }
 
-/// The tiers of the only competition that earlier versions had.
+/// The tier bounds of jobs of earlier versions, which had one competition only.
 #[expect(clippy::unnecessary_wraps, reason = "the type of the field")]
-const fn first_tiers() -> Option<TierBounds> {
+const fn legacy_tiers() -> Option<TierBounds> {
     Some(TierBounds::constant(
         Millionths::new(500_000),
         Millionths::new(1_500_000),
     ))
 }
 
-const fn first_ruleset() -> Ruleset {
+const fn legacy_ruleset() -> Ruleset {
     Ruleset::new("airhockey-2023.1")
 }
 
@@ -240,7 +242,7 @@ pub enum JobReport {
     Shard {
         /// One outcome per episode, in order; fewer if faults ended the shard.
         outcomes: Vec<EpisodeOutcome>,
-        /// Tail of the agent's standard error, with its faults.
+        /// The stored part of the agent's standard error (beginning and end), with its faults.
         log: String,
         /// Did the agent exceed the allowed faults, so that the remaining episodes were not played?
         stopped_by_faults: bool,
@@ -253,7 +255,7 @@ pub enum JobReport {
         score: Value,
         /// The game's files, if they were stored.
         recording: Option<GameFiles>,
-        /// Tails of both agents' standard errors with their faults, the home side's first.
+        /// The stored parts of both agents' standard errors with their faults, the home side's first.
         logs: [String; 2],
     },
     /// The result of a [`JobPayload::Scoring`].

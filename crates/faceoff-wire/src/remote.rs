@@ -18,7 +18,8 @@ pub struct RemoteJob {
     #[serde(rename = "files")]
     pub files_url: String,
     /// BLAKE3 of the server's executable, 64 hexadecimal digits. A worker with another executable does not start the job.
-    pub program: String,
+    #[serde(rename = "program")]
+    pub program_blake3: String,
     /// Links to bundles and recordings, if they are in a storage bucket instead of on the server.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub objects: Option<ObjectLinks>,
@@ -38,7 +39,8 @@ pub struct ObjectLinks {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct WorkerCapabilities {
     /// BLAKE3 of its executable, 64 hexadecimal digits. Only the same executable computes the same bits.
-    pub program: String,
+    #[serde(rename = "program")]
+    pub program_blake3: String,
     /// Version of its program, for display.
     pub version: String,
     /// Runtimes (language environments) that it offers to agents, with their content.
@@ -83,8 +85,8 @@ pub enum WorkerRequest {
         /// Number of episodes played so far; in a game, number of windows (parts of 500 control steps).
         episodes_done: u32,
         /// The problem that prevents the worker from sending the result, for organisers.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        trouble: Option<String>,
+        #[serde(default, rename = "trouble", skip_serializing_if = "Option::is_none")]
+        send_problem: Option<String>,
     },
     /// Reports that the result message is stored in NATS. From now on the server itself keeps the lease valid until it has accepted
     /// the result.
@@ -113,7 +115,8 @@ pub enum WorkerResponse {
         reason: String,
     },
     /// The server cannot answer now; the worker may ask again.
-    Unknown,
+    #[serde(rename = "unknown")]
+    Unavailable,
 }
 
 /// A live update of a running game. It has no influence on the result, and may get lost.
@@ -163,13 +166,13 @@ pub struct ResultMessage {
     pub grant: String,
     /// How the job ended.
     #[serde(rename = "outcome")]
-    pub end: JobEnd,
+    pub end: RemoteJobEnd,
 }
 
 /// How a job ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
-pub enum JobEnd {
+pub enum RemoteJobEnd {
     /// The job is done, and its files are stored.
     Done {
         /// The report of the job.

@@ -1,6 +1,6 @@
 //! Stores the clips of ablations. An *ablation* plays the same episodes in several simulator profiles. Each of its shards
-//! stores a *part*, a pack with the clips (motions for replays) of its episodes. Kept are the clips of the episodes that end
-//! differently than in the ideal simulator, with their ideal counterparts.
+//! stores a *part*, a pack with the clips (motions for replays) of its episodes. This module keeps the clips of episodes that end
+//! differently than in the ideal simulator, and the clips of the same episodes in the ideal simulator.
 
 use anyhow::Context as _;
 use faceoff_replay::{merged_index, select_episodes};

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 /// The result of unpacking a team's bundle.
 #[derive(Debug)]
-pub(crate) enum Unpacked {
+pub(crate) enum UnpackResult {
     Bundle(Bundle),
     /// The bundle is not valid, by the team's fault; the text says what is wrong.
     Invalid(String),
@@ -46,7 +46,7 @@ impl BundleCache {
 
     /// Returns the unpacked bundle of `agent`, and fetches it if it is not in the cache. All other bundles are removed,
     /// except that of the `opponent` in a game. The content is what was uploaded: the hash is checked on every fetch, and
-    /// agents see the folder read-only. An error is a platform fault, or `progress` was stopped.
+    /// agents see the folder read-only. An error is a platform fault, or the slot must stop (see `progress`).
     pub(crate) fn get(
         &mut self,
         agent: &AgentSpec,
@@ -54,7 +54,7 @@ impl BundleCache {
         evaluator: &dyn Evaluator,
         files: &dyn FileStore,
         progress: &Progress,
-    ) -> anyhow::Result<Unpacked> {
+    ) -> anyhow::Result<UnpackResult> {
         let mut found = None;
         let mut free = None;
         for entry in &mut self.entries {
@@ -67,7 +67,7 @@ impl BundleCache {
             }
         }
         match (found, free) {
-            (Some(bundle), _) => Ok(Unpacked::Bundle(bundle)),
+            (Some(bundle), _) => Ok(UnpackResult::Bundle(bundle)),
             (None, Some(entry)) => entry.fill(agent, evaluator, files, progress),
             (None, None) => anyhow::bail!("both cache entries of a slot hold the same bundle"),
         }
@@ -96,17 +96,17 @@ impl Entry {
         evaluator: &dyn Evaluator,
         files: &dyn FileStore,
         progress: &Progress,
-    ) -> anyhow::Result<Unpacked> {
+    ) -> anyhow::Result<UnpackResult> {
         let fetched = self.fetch(agent, evaluator, files, progress);
         // An invalid or partial bundle must not take space that the next one needs.
-        if !matches!(fetched, Ok(Unpacked::Bundle(_)))
+        if !matches!(fetched, Ok(UnpackResult::Bundle(_)))
             && self.folder.exists()
             && let Err(error) = fs::remove_dir_all(&self.folder)
         {
             tracing::warn!(%error, "a partial bundle could not be removed");
         }
         let unpacked = fetched?;
-        if let Unpacked::Bundle(bundle) = &unpacked {
+        if let UnpackResult::Bundle(bundle) = &unpacked {
             self.bundle = Some((agent.bundle.blake3.clone(), bundle.clone()));
         }
         Ok(unpacked)
@@ -118,7 +118,7 @@ impl Entry {
         evaluator: &dyn Evaluator,
         files: &dyn FileStore,
         progress: &Progress,
-    ) -> anyhow::Result<Unpacked> {
+    ) -> anyhow::Result<UnpackResult> {
         let unpacked = self.folder.join("unpacked");
         fs::create_dir_all(&unpacked)?;
         let archive = self.folder.join("archive");
@@ -130,14 +130,14 @@ impl Entry {
             "the stored bundle is not the uploaded one"
         );
         let opened = evaluator.unpack(&archive, &unpacked, &agent.limits.bundle, &|| {
-            progress.stopped()
+            progress.must_stop()
         });
         let bundle = match opened {
             Ok(bundle) => bundle,
             Err(BundleError::Invalid(reason)) => {
                 // An invalid bundle is removed at once.
                 fs::remove_dir_all(&self.folder)?;
-                return Ok(Unpacked::Invalid(reason));
+                return Ok(UnpackResult::Invalid(reason));
             }
             Err(BundleError::Cancelled) => return Err(PlatformFault::Cancelled.into()),
             Err(error @ BundleError::Io { .. }) => {
@@ -145,7 +145,7 @@ impl Entry {
             }
         };
         fs::remove_file(&archive)?;
-        Ok(Unpacked::Bundle(bundle))
+        Ok(UnpackResult::Bundle(bundle))
     }
 }
 

@@ -28,7 +28,7 @@ pub async fn clean_up(store: &Store, competition: &Arc<Competition>, clock: &Clo
     if let Err(error) = store.delete_old_deliveries(now).await {
         tracing::warn!(%error, "old webhook deliveries could not be removed");
     }
-    match store.forget_ended_credentials(now).await {
+    match store.delete_ended_credentials(now).await {
         Ok(0) => {}
         Ok(rows) => tracing::info!(
             rows,

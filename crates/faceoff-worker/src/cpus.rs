@@ -49,8 +49,8 @@ pub struct CpuLayout {
     pub slots: Vec<SlotCpus>,
     /// Do agents share CPUs because there are too few?
     pub shared: bool,
-    /// CPUs for the rest of a server: requests, database, schedule. Empty: any CPU.
-    pub service: Vec<usize>,
+    /// CPUs for the rest of the server: requests, database, schedule. Empty: any CPU.
+    pub server: Vec<usize>,
 }
 
 impl CpuLayout {
@@ -69,7 +69,7 @@ impl CpuLayout {
             return Self {
                 slots: vec![unpinned; slots],
                 shared: true,
-                service: Vec::new(),
+                server: Vec::new(),
             };
         }
         let slots = cpus
@@ -87,7 +87,7 @@ impl CpuLayout {
         Self {
             slots,
             shared: false,
-            service: Vec::new(),
+            server: Vec::new(),
         }
     }
 
@@ -95,12 +95,12 @@ impl CpuLayout {
     /// least one, is reserved for the server: the first ones, which handle most device interrupts. Otherwise the server
     /// shares the simulators' CPUs, never an agent's.
     #[must_use]
-    pub fn with_service(cpus: &[usize], slots: usize, agents: usize) -> Self {
+    pub fn with_server(cpus: &[usize], slots: usize, agents: usize) -> Self {
         let left_over = cpus.len().saturating_sub(slots * (1 + agents));
-        let (service, rest) = cpus.split_at(left_over.min((cpus.len() / 4).max(1)));
+        let (server_cpus, rest) = cpus.split_at(left_over.min((cpus.len() / 4).max(1)));
         let mut layout = Self::divide(rest, slots, agents);
         if !layout.shared {
-            layout.service = match service {
+            layout.server = match server_cpus {
                 [] => layout.simulators(),
                 reserved => reserved.to_vec(),
             };
@@ -117,9 +117,12 @@ impl CpuLayout {
             .copied()
             .filter(|cpu| !agents.contains(cpu))
             .collect();
-        let (simulators, service) = if others.len() > slots {
-            let (service, simulators) = others.split_at(others.len() - slots);
-            (simulators.iter().map(|cpu| vec![*cpu]).collect(), service)
+        let (simulators, server_cpus) = if others.len() > slots {
+            let (server_cpus, simulators) = others.split_at(others.len() - slots);
+            (
+                simulators.iter().map(|cpu| vec![*cpu]).collect(),
+                server_cpus,
+            )
         } else {
             (vec![Vec::new(); slots], &others[..])
         };
@@ -130,7 +133,7 @@ impl CpuLayout {
         Self {
             slots: simulators.into_iter().map(slot).collect(),
             shared: slots > 1,
-            service: service.to_vec(),
+            server: server_cpus.to_vec(),
         }
     }
 
@@ -145,7 +148,7 @@ impl CpuLayout {
         if !agent_cpus.is_empty() {
             return Self::with_agents_on(agent_cpus, &cpus, slots);
         }
-        let layout = Self::with_service(&cpus, slots, 1);
+        let layout = Self::with_server(&cpus, slots, 1);
         if layout.shared {
             tracing::warn!(
                 slots,
@@ -193,7 +196,7 @@ mod tests {
             CpuLayout {
                 slots,
                 shared: false,
-                service: Vec::new(),
+                server: Vec::new(),
             }
         );
     }
@@ -223,7 +226,7 @@ mod tests {
         assert_eq!(side_cpus(&[], &[&[]]), (none.clone(), none));
         // As recommended in docs/monitoring.md.
         for cpus in 7..=16 {
-            let layout = CpuLayout::with_service(&first_cpus(cpus), 2, 1);
+            let layout = CpuLayout::with_server(&first_cpus(cpus), 2, 1);
             for slot in &layout.slots {
                 let [first, second] = slot.side_cpus();
                 assert!(!first.is_empty() && !second.is_empty(), "{cpus}");
@@ -244,7 +247,7 @@ mod tests {
                 CpuLayout {
                     slots,
                     shared: true,
-                    service: Vec::new(),
+                    server: Vec::new(),
                 }
             );
         }
@@ -272,7 +275,7 @@ mod tests {
 
     #[test]
     fn server_never_shares_an_agents_cpus() {
-        for (cpus, slots, service) in [
+        for (cpus, slots, server_cpus) in [
             (1, 1, &[][..]),
             (2, 1, &[0]),
             (3, 1, &[0]),
@@ -282,14 +285,14 @@ mod tests {
             (8, 3, &[0, 1]),
             (9, 4, &[0]),
         ] {
-            let layout = CpuLayout::with_service(&first_cpus(cpus), slots, 1);
-            assert_eq!(layout.service, service, "{cpus} CPUs, {slots} slots");
+            let layout = CpuLayout::with_server(&first_cpus(cpus), slots, 1);
+            assert_eq!(layout.server, server_cpus, "{cpus} CPUs, {slots} slots");
             assert_eq!(layout.slots.len(), slots);
             let agents: Vec<_> = layout.slots.iter().flat_map(|s| &s.agents[0]).collect();
-            assert!(!service.iter().any(|cpu| agents.contains(&cpu)));
+            assert!(!server_cpus.iter().any(|cpu| agents.contains(&cpu)));
             if cpus > 2 * slots {
                 let simulators = layout.simulators();
-                assert!(!service.iter().any(|cpu| simulators.contains(cpu)));
+                assert!(!server_cpus.iter().any(|cpu| simulators.contains(cpu)));
             }
         }
     }
@@ -298,7 +301,7 @@ mod tests {
     fn configured_agent_cpus_leave_the_rest_to_others() {
         let layout = |agents: &[usize], cpus, slots| {
             let layout = CpuLayout::with_agents_on(agents, &first_cpus(cpus), slots);
-            (layout.simulators(), layout.service)
+            (layout.simulators(), layout.server)
         };
         assert_eq!(layout(&[1], 2, 1), (vec![], vec![0]));
         assert_eq!(layout(&[3], 4, 1), (vec![2], vec![0, 1]));

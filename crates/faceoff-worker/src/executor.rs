@@ -1,7 +1,7 @@
 //! Runs the jobs of a slot, one method per kind of job.
 
 use crate::{
-    bundle_cache::{BundleCache, Unpacked},
+    bundle_cache::{BundleCache, UnpackResult},
     cpus::SlotCpus,
     evaluator::Evaluator,
     files::FileStore,
@@ -22,7 +22,7 @@ use faceoff_wire::job::{
 use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
 
 /// Runs the jobs of a slot. All errors are platform faults, with one exception: a job also ends with an error soon after
-/// [`Progress::stopped`] becomes true.
+/// [`Progress::must_stop`] becomes true.
 pub(crate) struct Executor {
     /// Timing quality of the slot in the last shard.
     pub(crate) timing: Option<SlotTiming>,
@@ -69,7 +69,7 @@ impl AgentHost {
             runtimes: self.runtimes.clone(),
             images: self.images,
             agent_cpus,
-            supervision: Supervision::new(move || progress.stopped()),
+            supervision: Supervision::new(move || progress.must_stop()),
             simulator: Arc::clone(&self.simulator),
         }
     }
@@ -123,7 +123,7 @@ impl Executor {
         agent: &AgentSpec,
         opponent: Option<&AgentSpec>,
         progress: &Progress,
-    ) -> anyhow::Result<Unpacked> {
+    ) -> anyhow::Result<UnpackResult> {
         self.bundles
             .get(agent, opponent, &*self.evaluator, &*self.files, progress)
     }
@@ -136,8 +136,8 @@ impl Executor {
         progress: &Progress,
     ) -> anyhow::Result<Bundle> {
         match self.unpacked_bundle(agent, opponent, progress)? {
-            Unpacked::Bundle(bundle) => Ok(bundle),
-            Unpacked::Invalid(reason) => anyhow::bail!(reason),
+            UnpackResult::Bundle(bundle) => Ok(bundle),
+            UnpackResult::Invalid(reason) => anyhow::bail!(reason),
         }
     }
 
@@ -158,8 +158,8 @@ impl Executor {
         progress: &Progress,
     ) -> anyhow::Result<ValidationOutcome> {
         let bundle = match self.unpacked_bundle(agent, None, progress)? {
-            Unpacked::Bundle(bundle) => bundle,
-            Unpacked::Invalid(reason) => {
+            UnpackResult::Bundle(bundle) => bundle,
+            UnpackResult::Invalid(reason) => {
                 return Ok(ValidationOutcome::Invalid {
                     agent_name: None,
                     runtime: None,
@@ -182,7 +182,7 @@ impl Executor {
         let environment = self.host.environment(&agent.limits, progress);
         let validated = self
             .evaluator
-            .validate(spec, &bundle, &environment, &|| progress.stopped())?;
+            .validate(spec, &bundle, &environment, &|| progress.must_stop())?;
         let (agent_name, timing, log) = (bundle.manifest.name, validated.timing, validated.log);
         Ok(match validated.failure {
             None => ValidationOutcome::Valid {

@@ -52,7 +52,7 @@ impl LiveFeedSink for GameBroadcast {
     }
 
     fn cancelled(&self) -> bool {
-        self.progress.stopped()
+        self.progress.must_stop()
     }
 }
 
@@ -63,7 +63,7 @@ impl Drop for GameBroadcast {
     }
 }
 
-/// Shows an update of an attempt (its number) at a game to the viewers.
+/// Shows viewers a live update of an attempt, given as the game's id and the number of the attempt.
 pub(crate) fn show_update(
     games: &LiveGames,
     (game, attempt): (GameId, u32),

@@ -79,7 +79,7 @@ impl Drop for LeaseKeeper {
 
 impl Progress {
     /// Must the slot stop, because of the shutdown or a lost lease?
-    pub(crate) fn stopped(&self) -> bool {
+    pub(crate) fn must_stop(&self) -> bool {
         self.stop.is_cancelled()
     }
 
@@ -101,7 +101,7 @@ impl faceoff_runner::Observer for Progress {
     }
 
     fn cancelled(&self) -> bool {
-        self.stopped()
+        self.must_stop()
     }
 }
 

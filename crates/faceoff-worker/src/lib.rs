@@ -41,9 +41,9 @@ pub(crate) use async_recursion::async_recursion as boxed;
 pub use cleanup::clean_up;
 pub use cpus::{CpuLayout, SlotCpus};
 pub use remote::{
-    BucketConfig, ConnectionCheck, NatsConfig, RemoteConfig, RemoteWorker, check_connection,
+    BucketConfig, ConnectionCheck, NatsConfig, RemoteConfig, RemoteWorkerConfig, check_connection,
     dispatch, run_remote_worker,
 };
-pub use schedule::{run_schedule, start_due};
+pub use schedule::{run_schedule, update_due_days};
 pub use service::{SlotsConfig, WorkerConfig, run};
 pub use slot_threads::{SlotStarter, SlotThreads};

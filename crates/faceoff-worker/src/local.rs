@@ -34,7 +34,7 @@ use tokio_util::sync::CancellationToken;
 #[derive(Debug, Clone)]
 pub(crate) struct LocalServer {
     pub(crate) store: Store,
-    /// Viewers of games and organisers see it.
+    /// State of running games and remote workers, shown to viewers and organisers.
     pub(crate) live: LiveState,
     pub(crate) runtime: Handle,
     pub(crate) clock: Clock,
@@ -49,7 +49,7 @@ pub(crate) struct LocalServer {
 }
 
 impl LocalServer {
-    /// The competition whose jobs it hands out.
+    /// The competition to which all jobs belong.
     pub(crate) fn competition(&self) -> &Arc<Competition> {
         self.simulator.competition()
     }
@@ -211,7 +211,7 @@ impl LocalServer {
         let lease = Lease {
             job_id: claim.job,
             nonce: claim.nonce,
-            slot: claim.worker,
+            holder: claim.holder,
             expires_at: claim.lease_until,
             duration_s: self.lease_s,
         };
@@ -336,7 +336,7 @@ impl JobServer for LocalServer {
     }
 
     fn renew(&self, lease: &Lease, episodes_done: u32) -> anyhow::Result<LeaseStatus> {
-        let claim = claim(lease, &lease.slot);
+        let claim = claim(lease, &lease.holder);
         let renewed = self
             .store
             .heartbeat(&claim, episodes_done, self.lease_s, self.clock.now());
@@ -352,7 +352,7 @@ impl JobServer for LocalServer {
     }
 
     fn commit(&self, lease: &Lease, report: JobReport) -> anyhow::Result<LeaseStatus> {
-        let (claim, now) = (claim(lease, &lease.slot), self.clock.now());
+        let (claim, now) = (claim(lease, &lease.holder), self.clock.now());
         self.runtime.block_on(async {
             match report {
                 JobReport::Validation(outcome) => {
@@ -398,7 +398,7 @@ impl JobServer for LocalServer {
     }
 
     fn release(&self, lease: &Lease, reason: ReleaseReason<'_>) -> anyhow::Result<()> {
-        let (claim, now) = (claim(lease, &lease.slot), self.clock.now());
+        let (claim, now) = (claim(lease, &lease.holder), self.clock.now());
         Ok(self.runtime.block_on(async {
             match reason {
                 ReleaseReason::Interrupted => self.store.release(&claim, now).await,
@@ -463,7 +463,7 @@ pub(crate) fn claim(lease: &Lease, holder: &str) -> JobClaim {
     JobClaim {
         job: lease.job_id,
         nonce: lease.nonce,
-        worker: holder.to_owned(),
+        holder: holder.to_owned(),
         lease_until: lease.expires_at,
     }
 }

@@ -48,4 +48,4 @@ pub use bucket::BucketConfig;
 pub use connection::NatsConfig;
 pub use connection_check::{ConnectionCheck, check_connection};
 pub use dispatch::{RemoteConfig, dispatch};
-pub use worker::{RemoteWorker, run_remote_worker};
+pub use worker::{RemoteWorkerConfig, run_remote_worker};

@@ -27,23 +27,24 @@ pub async fn run_schedule(
     let mut failed = false;
     loop {
         let now = clock.now();
-        let next_start = match start_unless_behind(&store, &competition, &clock, now).await {
-            Ok(next_start) => {
-                failed = false;
-                next_start
-            }
-            Err(error) => {
-                // Logged once, since it recurs every second.
-                if !failed {
-                    tracing::error!(
-                        error = format!("{error:#}"),
-                        "days could not be ended or started; trying again"
-                    );
+        let next_start =
+            match update_due_days_unless_behind(&store, &competition, &clock, now).await {
+                Ok(next_start) => {
+                    failed = false;
+                    next_start
                 }
-                failed = true;
-                None
-            }
-        };
+                Err(error) => {
+                    // Logged once, since it recurs every second.
+                    if !failed {
+                        tracing::error!(
+                            error = format!("{error:#}"),
+                            "days could not be ended or started; trying again"
+                        );
+                    }
+                    failed = true;
+                    None
+                }
+            };
         let wait = next_start.map_or(LONGEST_SLEEP, |start| {
             Duration::try_from(start.duration_since(now)).unwrap_or(Duration::ZERO)
         });
@@ -54,9 +55,9 @@ pub async fn run_schedule(
     }
 }
 
-/// As [`start_due`], but nothing is due as long as the clock is before the newest change of the database: no clock says then what
-/// time it is.
-pub(crate) async fn start_unless_behind(
+/// As [`update_due_days`], but nothing is due as long as the clock is before the newest change of the database, because the time
+/// is not known then.
+pub(crate) async fn update_due_days_unless_behind(
     store: &Store,
     competition: &Competition,
     clock: &Clock,
@@ -64,14 +65,14 @@ pub(crate) async fn start_unless_behind(
 ) -> anyhow::Result<Option<Timestamp>> {
     match clock.step() {
         Some(step) if step.cause == StepCause::NewestChange => Ok(None),
-        _ => start_due(store, competition, now).await,
+        _ => update_due_days(store, competition, now).await,
     }
 }
 
 /// Ends and starts all days that are due at `now`, and returns the time of the next start, if any. [`run_schedule`]
 /// calls it at the right times.
 #[boxed]
-pub async fn start_due(
+pub async fn update_due_days(
     store: &Store,
     competition: &Competition,
     now: Timestamp,

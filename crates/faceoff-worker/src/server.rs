@@ -24,7 +24,8 @@ pub(crate) trait JobServer: Send + Sync {
         Duration::from_secs(lease.duration_s.into()) / 3
     }
 
-    /// Publishes a live update of an attempt (its number) at a game. Over a slow or broken connection, updates may get lost.
+    /// Publishes a live update of a game. `attempt` is the game's id and the number of the attempt, from 1. Updates may get lost over
+    /// a slow or broken connection.
     fn publish_game(&self, lease: &Lease, attempt: (GameId, u32), update: LiveGameUpdate);
 
     /// Stores the result of a job; a repetition under the same lease has no effect. Files that were uploaded under a lost

@@ -159,7 +159,7 @@ pub(crate) async fn run_with(
 
     let files = server.files();
     let cleanup = tokio::spawn(run_cleanup(server, intervals.cleanup, shutdown.clone()));
-    let servers = (0..config.slots.cpus.slots.len()).map(|index| SlotServer {
+    let slot_setups = (0..config.slots.cpus.slots.len()).map(|index| SlotSetup {
         slot: format!("{}/slot-{index}", scratch.worker()),
         server: Arc::clone(&slots_server),
         files: Arc::new(files.clone()),
@@ -167,11 +167,11 @@ pub(crate) async fn run_with(
             files: files.clone(),
         }),
     });
-    let servers = servers.collect();
+    let slot_setups = slot_setups.collect();
     let result = run_slots(
         config.slots,
         &scratch,
-        servers,
+        slot_setups,
         evaluator,
         intervals,
         shutdown,
@@ -181,8 +181,8 @@ pub(crate) async fn run_with(
     result
 }
 
-/// The name of a slot, the server from which it gets jobs, and their files.
-pub(crate) struct SlotServer {
+/// What a slot needs: its name, the server from which it gets jobs, and their files.
+pub(crate) struct SlotSetup {
     pub(crate) slot: String,
     pub(crate) server: Arc<dyn JobServer>,
     pub(crate) files: Arc<dyn FileStore>,
@@ -190,11 +190,11 @@ pub(crate) struct SlotServer {
     pub(crate) scorer: Option<Scorer>,
 }
 
-/// Runs one slot per entry of `servers` until `shutdown` is cancelled.
+/// Runs one slot per entry of `slot_setups` until `shutdown` is cancelled.
 pub(crate) async fn run_slots(
     config: SlotsConfig,
     scratch: &Scratch,
-    servers: Vec<SlotServer>,
+    slot_setups: Vec<SlotSetup>,
     evaluator: Arc<dyn Evaluator>,
     intervals: Intervals,
     shutdown: CancellationToken,
@@ -206,16 +206,16 @@ pub(crate) async fn run_slots(
     let stop = shutdown.child_token();
     // Ends the threads when this function ends, for whatever reason.
     let _stop = stop.clone().drop_guard();
-    tokio::spawn(report_stalled_slots(config.metrics.clone(), stop.clone()));
+    tokio::spawn(report_stuck_slots(config.metrics.clone(), stop.clone()));
     let mut slots = JoinSet::new();
-    let cpus_and_servers = config.cpus.slots.into_iter().zip(servers);
-    for (index, (cpus, slot_server)) in cpus_and_servers.enumerate() {
-        let SlotServer {
+    let cpus_and_setups = config.cpus.slots.into_iter().zip(slot_setups);
+    for (index, (cpus, slot_setup)) in cpus_and_setups.enumerate() {
+        let SlotSetup {
             slot: name,
             server,
             files,
             scorer,
-        } = slot_server;
+        } = slot_setup;
         let folder = scratch.slot(index)?;
         let slot = Slot {
             name,
@@ -297,8 +297,9 @@ async fn wait_for(
     }
 }
 
-/// Keeps the metric of stalled slots, whose threads are blocked although their agents have ended, up to date; the server's health depends on it.
-async fn report_stalled_slots(metrics: Metrics, stop: CancellationToken) {
+/// Keeps the metric of stuck slots up to date. A slot is stuck if its thread is blocked although its agents have ended. The server's
+/// health depends on it.
+async fn report_stuck_slots(metrics: Metrics, stop: CancellationToken) {
     const INTERVAL: Duration = Duration::from_secs(1);
     loop {
         metrics.slots().set_stuck(faceoff_runner::stuck_threads());

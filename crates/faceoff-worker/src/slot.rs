@@ -166,7 +166,7 @@ impl Slot {
         drop(keeper);
         match committed {
             // This is no fault: the job was released or cancelled, or another slot has it.
-            Err(error) if progress.stopped() || self.has_lost_lease(job, &progress) => {
+            Err(error) if progress.must_stop() || self.has_lost_lease(job, &progress) => {
                 tracing::info!(job = %job.lease.job_id, cause = format!("{error:#}"), "stopped");
                 Ok(LeaseStatus::Lost)
             }
@@ -174,8 +174,8 @@ impl Slot {
         }
     }
 
-    /// Asks the server after an error, which may come from the loss of the lease, before the lease keeper has asked: without it a
-    /// remote worker gets no files of the job.
+    /// Has the slot lost its lease? Asked after an error, because without the lease the server refuses a remote worker the files of
+    /// the job, and the lease keeper may not have noticed the loss yet.
     fn has_lost_lease(&self, job: &JobSpec, progress: &Progress) -> bool {
         let status = self.server.renew(&job.lease, progress.episodes_done());
         matches!(status, Ok(LeaseStatus::Lost))
@@ -201,7 +201,7 @@ impl Slot {
         loop {
             let committed = self.server.commit(&job.lease, report.clone());
             match committed {
-                Err(error) if self.server.is_full_disk(&error) && !progress.stopped() => {
+                Err(error) if self.server.is_full_disk(&error) && !progress.must_stop() => {
                     if !is_logged {
                         tracing::warn!(job = %id, cause = format!("{error:#}"), "disk full: waiting to commit");
                         is_logged = true;
@@ -244,7 +244,7 @@ impl Slot {
 
 /// A span with the ids of the job and of what it belongs to.
 fn span(job: &JobSpec) -> tracing::Span {
-    let (id, slot) = (job.lease.job_id, &job.lease.slot);
+    let (id, slot) = (job.lease.job_id, &job.lease.holder);
     match &job.payload {
         JobPayload::Validation { submission, .. } => {
             tracing::info_span!("slot", job = %id, slot, %submission)

@@ -80,7 +80,7 @@ pub struct Unreachable(pub String);
 #[error("it answered {0}, but not as a Faceoff server does")]
 struct ForeignAnswer(StatusCode);
 
-/// Whether a proxy's or server's answer with this status may be another one later.
+/// Is this status of a server or proxy temporary, so that the same request may succeed later?
 fn is_temporary_status(status: StatusCode) -> bool {
     status.is_server_error()
         || [StatusCode::TOO_MANY_REQUESTS, StatusCode::REQUEST_TIMEOUT].contains(&status)
@@ -100,27 +100,27 @@ fn is_temporary(error: &anyhow::Error) -> bool {
     }
 }
 
-/// Repeats a request that only reads while its failures are temporary, for at most `patience`.
+/// Repeats a request that only reads while its failures are temporary, for at most `retry_timeout`.
 ///
 /// # Errors
 /// The last failure.
 pub async fn retry_temporary<T>(
-    patience: Duration,
+    retry_timeout: Duration,
     request: impl AsyncFn() -> anyhow::Result<T>,
 ) -> anyhow::Result<T> {
-    retry_while(is_temporary, patience, request).await
+    retry_while(is_temporary, retry_timeout, request).await
 }
 
-/// Repeats a request while its failures are such, for at most `patience`.
+/// Repeats a request while `is_retryable` is true for its failure, for at most `retry_timeout`.
 async fn retry_while<T>(
-    is_such: impl Fn(&anyhow::Error) -> bool,
-    patience: Duration,
+    is_retryable: impl Fn(&anyhow::Error) -> bool,
+    retry_timeout: Duration,
     request: impl AsyncFn() -> anyhow::Result<T>,
 ) -> anyhow::Result<T> {
-    let give_up_at = Instant::now() + patience;
+    let give_up_at = Instant::now() + retry_timeout;
     loop {
         match request().await {
-            Err(error) if is_such(&error) && Instant::now() < give_up_at => {
+            Err(error) if is_retryable(&error) && Instant::now() < give_up_at => {
                 tokio::time::sleep(RETRY_PAUSE).await;
             }
             result => return result,
@@ -362,7 +362,7 @@ async fn read_json<T: DeserializeOwned>(response: Response) -> anyhow::Result<T>
     ))
 }
 
-/// A path beside `file`, for a part of it or about it.
+/// The path of `file` with `suffix` appended to the file name.
 #[must_use]
 pub fn with_suffix(file: &Path, suffix: &str) -> PathBuf {
     let mut path = file.as_os_str().to_owned();

@@ -22,7 +22,7 @@ pub fn simulator() -> Arc<dyn Simulator> {
     SIMULATOR.clone()
 }
 
-/// Files that describe the competition to other programs: name, content, and the text.
+/// Files that describe the competition to other programs: file name, description, and content.
 pub fn description_files() -> [(&'static str, &'static str, String); 2] {
     [
         (

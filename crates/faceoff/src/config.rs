@@ -29,7 +29,7 @@ use std::{
 pub const DEFAULT_FILE: &str = "faceoff.toml";
 
 /// The defaults with units and meanings, written by `faceoff init`.
-pub const COMMENTED: &str = include_str!("config/faceoff.toml");
+pub const COMMENTED_DEFAULTS: &str = include_str!("config/faceoff.toml");
 
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -82,7 +82,7 @@ pub struct ServerConfig {
     /// Address of metrics and health checks without a token; left out: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub metrics_listen: Option<SocketAddr>,
-    /// Folder of the database, the artifacts and the organiser's token.
+    /// Folder of the database, the artifacts and the operator's token.
     pub data_dir: PathBuf,
     /// Bytes that must stay free on the disks of `data_dir` and `workers.scratch_dir`; below, the queue
     /// pauses and uploads are refused. 0: never.
@@ -170,7 +170,7 @@ impl Default for EvaluationConfig {
             tier_bounds: competition().tiers,
             perturbations: Magnitudes::default(),
             publishes: settings.publishes,
-            standings: settings.standings,
+            standings: settings.counting_result,
         }
     }
 }
@@ -420,7 +420,7 @@ impl Config {
             episodes_per_shard: evaluation.episodes_per_shard,
             day_deadline: evaluation.day_deadline,
             publishes: evaluation.publishes,
-            standings: evaluation.standings,
+            counting_result: evaluation.standings,
             ..StageSettings::default()
         })
     }

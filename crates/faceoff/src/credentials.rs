@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn readable_or_invalid_file_is_refused_unquoted() {
+    fn file_open_to_others_or_invalid_is_refused_unquoted() {
         let home = tempfile::tempdir().unwrap();
         let file = home.path().join("credentials.toml");
         let message = || format!("{:#}", Credentials::load(&file).unwrap_err());

@@ -102,7 +102,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn evaluations_come_first_and_addresses_are_limited() {
+    fn slots_are_reserved_first_and_addresses_are_limited() {
         let requested = ConnectionLimits::default();
         let divide = |limit, slots| Descriptors::divide(limit, slots, &requested);
         let large = divide(65_536, 4).unwrap();

@@ -9,15 +9,15 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Set for the command in the scope, so that it starts no other one.
-const MARK: &str = "FACEOFF_IN_USER_SCOPE";
+/// Environment variable that marks a command inside a scope, so that it does not start another scope.
+const IN_SCOPE_VARIABLE: &str = "FACEOFF_IN_USER_SCOPE";
 
 /// Longest time until a manager has started a command.
-const TRIAL_TIMEOUT: Duration = Duration::from_secs(5);
+const PROBE_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Continues this command in a scope, if there is a manager that offers one. Otherwise returns.
 pub fn enter() {
-    if env::var_os(MARK).is_some() {
+    if env::var_os(IN_SCOPE_VARIABLE).is_some() {
         return;
     }
     let Some(runtime_folder) = env::var_os("XDG_RUNTIME_DIR") else {
@@ -31,7 +31,7 @@ pub fn enter() {
         let mut command = scope("systemd-run");
         let command = command.arg(program).args(env::args_os().skip(1));
         // Returns only if the command cannot be started.
-        let error = command.env(MARK, "1").exec();
+        let error = command.env(IN_SCOPE_VARIABLE, "1").exec();
         tracing::debug!(%error, "the command runs without a scope");
     }
 }
@@ -43,25 +43,25 @@ fn is_offered(cgroups: &Path, runtime_folder: &Path, systemd_run: &str) -> bool 
     {
         return false;
     }
-    let mut trial = scope(systemd_run);
-    let trial = trial.arg("true").stdin(Stdio::null());
-    let trial = trial.stdout(Stdio::null()).stderr(Stdio::null()).spawn();
-    trial.is_ok_and(|mut trial| succeeds(&mut trial))
+    let mut probe = scope(systemd_run);
+    let probe = probe.arg("true").stdin(Stdio::null());
+    let probe = probe.stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+    probe.is_ok_and(|mut probe| succeeds(&mut probe))
 }
 
-/// Waits for the end of a trial; one that takes too long has failed.
-fn succeeds(trial: &mut Child) -> bool {
-    let give_up_at = Instant::now() + TRIAL_TIMEOUT;
+/// Waits for the end of a probe; one that takes too long has failed.
+fn succeeds(probe: &mut Child) -> bool {
+    let give_up_at = Instant::now() + PROBE_TIMEOUT;
     while Instant::now() < give_up_at {
-        match trial.try_wait() {
+        match probe.try_wait() {
             Ok(Some(status)) => return status.success(),
             Ok(None) => std::thread::sleep(Duration::from_millis(10)),
             Err(_) => return false,
         }
     }
     // It may have ended meanwhile.
-    let _ = trial.kill();
-    let _ = trial.wait();
+    let _ = probe.kill();
+    let _ = probe.wait();
     false
 }
 

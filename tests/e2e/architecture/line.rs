@@ -19,7 +19,7 @@ const WORDS: [&str; 8] = [
 ];
 
 /// The crates of a row of the table "The line".
-pub fn side(row: &str) -> BTreeSet<String> {
+pub fn crates_on_side(row: &str) -> BTreeSet<String> {
     let text = fs::read_to_string(repository().join("ARCHITECTURE.md"))
         .expect("ARCHITECTURE.md can be read");
     let line = text
@@ -98,9 +98,12 @@ pub fn findings(folder: &Path, air_hockey: &BTreeSet<String>) -> Vec<Finding> {
         (path, syntax)
     };
     let files: Vec<(PathBuf, syn::File)> = paths.into_iter().map(read).collect();
-    let of_tests: BTreeSet<PathBuf> = files.iter().flat_map(test_modules).collect();
+    let test_only_files: BTreeSet<PathBuf> = files.iter().flat_map(test_modules).collect();
     let mut found = Vec::new();
-    for (file, syntax) in files.iter().filter(|(file, _)| !of_tests.contains(file)) {
+    for (file, syntax) in files
+        .iter()
+        .filter(|(file, _)| !test_only_files.contains(file))
+    {
         let mut finder = WordFinder {
             // The agents are programs, no crates that others import.
             crates: air_hockey

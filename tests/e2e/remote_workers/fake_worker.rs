@@ -1,5 +1,5 @@
-//! A client of the workers' protocol that runs no jobs. It takes them like any other worker, and reports results that it never
-//! computed.
+//! A client of the workers' protocol that runs no jobs. It takes jobs like any other worker, and reports results that it never
+//! computed. In the protocol, `order` is a job, `outcomes` are results, and `asks` are requests of workers.
 
 use async_nats::{
     Client, HeaderMap,

@@ -422,7 +422,10 @@ fn result_whose_checks_never_end_bans_its_worker() {
     let view = server.get("/api/v1/workers", Some(&server.admin_token));
     let view: Value = view.json().expect("the API speaks JSON");
     let reason = view["bans"][0]["reason"].as_str().unwrap_or_default();
-    assert!(reason.contains("three checks of its result"), "{view:#}");
+    assert!(
+        reason.contains("three checks of the worker's result"),
+        "{view:#}"
+    );
     let honest = Worker::start(scratch.path(), "honest", &worker_config(nats.address(), 1));
     reference_run.assert_equal_result(&server);
     honest.stop();

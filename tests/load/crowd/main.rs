@@ -45,13 +45,14 @@ const EPISODES_PER_TASK: u32 = 1000;
 const EPISODES_PER_SHARD: u32 = 50;
 const TASKS: u32 = 3;
 /// Shards of one evaluation.
-const SHARDS: u32 = TASKS * EPISODES_PER_TASK.div_ceil(EPISODES_PER_SHARD);
+const SHARDS_PER_EVALUATION: u32 = TASKS * EPISODES_PER_TASK.div_ceil(EPISODES_PER_SHARD);
 /// Teams. A stage has one cutoff a day, so further evaluations need further stages.
 const TEAMS: u32 = 8;
 /// Numbers of workers of the first phases.
 const FEW_WORKERS: [usize; 5] = [1, 2, 4, 8, 16];
-/// Shards of each worker in a first phase, and the time of each.
-const ROUNDS: u32 = 10;
+/// Shards of each worker in a phase with few workers.
+const SHARDS_PER_WORKER: u32 = 10;
+/// Duration of a shard in these phases.
 const FEW_SLEEP: Duration = Duration::from_secs(2);
 /// The largest relative deviation of a shard's duration. With equal durations all workers would always request jobs at the same
 /// time.
@@ -62,6 +63,7 @@ const SAMPLE_INTERVAL: Duration = Duration::from_secs(1);
 const DATABASE_THREAD: &str = "sqlx-sqlite";
 
 struct Settings {
+    /// Shards of the phase with all workers, at least.
     shards: u32,
     workers: usize,
     sleep: Duration,
@@ -98,18 +100,18 @@ fn main() -> anyhow::Result<()> {
     let scratch = tempfile::tempdir()?;
     let nats = Nats::start(&scratch.path().join("nats"));
     let server = Server::start(&scratch.path().join("data"), &configuration(&nats));
-    let few_shards = FEW_WORKERS.iter().sum::<usize>() * ROUNDS as usize;
+    let few_shards = FEW_WORKERS.iter().sum::<usize>() * SHARDS_PER_WORKER as usize;
     let few_shards = u32::try_from(few_shards)?;
-    let stages = (settings.shards + few_shards).div_ceil(SHARDS * TEAMS);
+    let stages = (settings.shards + few_shards).div_ceil(SHARDS_PER_EVALUATION * TEAMS);
     let evaluations_queued = QueuedEvaluations::create(&server, stages)?;
-    let many_shards = stages * TEAMS * SHARDS - few_shards;
+    let many_shards = stages * TEAMS * SHARDS_PER_EVALUATION - few_shards;
     println!(
-        "{} evaluations of {SHARDS} shards of {EPISODES_PER_SHARD} episodes are queued",
+        "{} evaluations of {SHARDS_PER_EVALUATION} shards of {EPISODES_PER_SHARD} episodes are queued",
         evaluations_queued.evaluations.len()
     );
 
     let runtime = Runtime::new()?;
-    let evaluations = Arc::new(Evaluations::new(SHARDS));
+    let evaluations = Arc::new(Evaluations::new(SHARDS_PER_EVALUATION));
     let (capabilities, url) = (worker_capabilities(&server)?, nats.url());
     let mut simulated_workers = Vec::new();
     for number in 0..settings.workers.max(FEW_WORKERS[FEW_WORKERS.len() - 1]) {
@@ -250,7 +252,7 @@ fn few_phases(
         let plan = Plan {
             sleep: FEW_SLEEP,
             spread: 0.0,
-            workload: Workload::PerWorker(ROUNDS),
+            workload: Workload::PerWorker(SHARDS_PER_WORKER),
         };
         runtime.block_on(run_phase(simulated_workers, workers, plan))
     };

@@ -14,7 +14,9 @@ use faceoff_types::{
 };
 use faceoff_wire::{
     job::{JobPayload, JobReport, Lease, OutputFiles, ShardSpec},
-    remote::{JobEnd, RemoteJob, ResultMessage, WorkerCapabilities, WorkerRequest, WorkerResponse},
+    remote::{
+        RemoteJob, RemoteJobEnd, ResultMessage, WorkerCapabilities, WorkerRequest, WorkerResponse,
+    },
 };
 use futures::StreamExt as _;
 use reqwest::{StatusCode, header};
@@ -142,8 +144,8 @@ struct StartedJob {
     /// The permission for the job's files.
     grant: String,
     files_url: String,
-    /// The evaluation.
-    part_of: Uuid,
+    /// The id of the evaluation.
+    evaluation: Uuid,
     /// The hash of the agent's bundle.
     bundle: String,
     spec: ShardSpec,
@@ -311,7 +313,7 @@ impl SimulatedWorker {
         if self.request(&start).await? != WorkerResponse::Accepted {
             return Ok(None);
         }
-        lease.slot = format!("remote/{}/{SLOT}", self.name);
+        lease.holder = format!("remote/{}/{SLOT}", self.name);
         let JobPayload::Shard {
             part_of,
             agent,
@@ -325,7 +327,7 @@ impl SimulatedWorker {
             lease,
             grant,
             files_url,
-            part_of,
+            evaluation: part_of,
             bundle: agent.bundle.blake3,
             spec,
             recording,
@@ -396,21 +398,23 @@ impl SimulatedWorker {
             let renew = WorkerRequest::RenewLease {
                 lease: job.lease.clone(),
                 episodes_done: (progress * episodes as f64) as u32,
-                trouble: None,
+                send_problem: None,
             };
             match self.request(&renew).await {
                 Ok(WorkerResponse::Accepted) => {}
                 Ok(WorkerResponse::Refused { .. }) => return,
-                Ok(WorkerResponse::Unknown) | Err(_) => *unanswered += 1,
+                Ok(WorkerResponse::Unavailable) | Err(_) => *unanswered += 1,
             }
         }
     }
 
     /// Sends the result of a job. Returns the number of failed attempts.
     async fn send_result(&self, job: &StartedJob) -> anyhow::Result<u32> {
-        let is_last = self.evaluations.record_played(job.part_of);
+        let is_last = self.evaluations.record_played(job.evaluation);
         if is_last {
-            self.evaluations.wait_for_other_results(job.part_of).await;
+            self.evaluations
+                .wait_for_other_results(job.evaluation)
+                .await;
         }
         let report = JobReport::Shard {
             outcomes: outcomes(&job.spec, is_last),
@@ -421,7 +425,7 @@ impl SimulatedWorker {
         let result = ResultMessage {
             lease: job.lease.clone(),
             grant: job.grant.clone(),
-            end: JobEnd::Done {
+            end: RemoteJobEnd::Done {
                 report: Box::new(report),
             },
         };
@@ -458,7 +462,7 @@ impl SimulatedWorker {
                 }
             }
         };
-        self.evaluations.record_result(job.part_of);
+        self.evaluations.record_result(job.evaluation);
         let pending = WorkerRequest::ResultPending {
             lease: job.lease.clone(),
             episodes_done: job.spec.episodes.end - job.spec.episodes.start,

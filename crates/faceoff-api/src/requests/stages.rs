@@ -236,13 +236,13 @@ pub struct StagePatch {
     #[cfg_attr(
         feature = "clap",
         arg(
-            long,
+            long = "standings",
             value_name = "RESULT",
             help = "The result that counts for a team: latest, best, mean_of_last:N, or final"
         )
     )]
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub standings: Option<CountingResult>,
+    #[serde(rename = "standings", skip_serializing_if = "Option::is_none")]
+    pub counting_result: Option<CountingResult>,
     /// The stage's name. Required if the change starts a new revision of an open stage, reorders its board, or removes
     /// files.
     #[cfg_attr(feature = "clap", arg(skip))]
@@ -323,7 +323,7 @@ impl StagePatch {
         replace(&mut settings.day_deadline, self.day_deadline.as_ref());
         replace(&mut settings.blind, self.blind.as_ref());
         replace(&mut settings.publishes, self.publishes.as_ref());
-        replace(&mut settings.standings, self.standings.as_ref());
+        replace(&mut settings.counting_result, self.counting_result.as_ref());
         replace(&mut settings.uploads, self.uploads.as_ref());
         rules.check()?;
         settings.check()
@@ -395,7 +395,7 @@ mod tests {
             day_deadline: DayDeadline::Hours(30),
             blind: true,
             publishes: Publication::Never,
-            standings: CountingResult::Best,
+            counting_result: CountingResult::Best,
             uploads: StageUploadLimits {
                 waiting: Some(2),
                 ..StageUploadLimits::default()

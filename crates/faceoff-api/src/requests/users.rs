@@ -24,7 +24,8 @@ pub struct NewToken {
 /// What happens to the tokens, invitations and webhooks that were made with a revoked token.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Made {
+#[schema(as = Made)]
+pub enum CreatedWithToken {
     /// They stay.
     Keep,
     /// They end.
@@ -39,7 +40,7 @@ pub struct RevocationQuery {
     /// What happens to all that was made with the token. Default: it ends, unless the token is your own: others may have used it.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[param(inline)]
-    pub made: Option<Made>,
+    pub made: Option<CreatedWithToken>,
 }
 
 /// The role that an invitation gives.

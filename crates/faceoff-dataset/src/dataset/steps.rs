@@ -97,7 +97,7 @@ pub(super) fn reader<R: ChunkReader + 'static>(
     Ok(
         ParquetRecordBatchReaderBuilder::new_with_metadata(table, metadata.clone())
             .with_projection(mask)
-            .with_batch_size(BATCH_ROWS.max(competition.longest_episode() as usize)),
+            .with_batch_size(BATCH_ROWS.max(competition.longest_episode_steps() as usize)),
     )
 }
 

@@ -37,10 +37,10 @@ async fn running_site() -> (Site, JobClaim) {
 }
 
 /// Starts the days that are due by the server's clock. Returns the number of all days.
-async fn start_due(site: &Site) -> usize {
+async fn update_due_days(site: &Site) -> usize {
     let competition = faceoff_airhockey::competition();
     let now = site.clock().now();
-    let started = faceoff_worker::start_due(&site.store, &competition, now).await;
+    let started = faceoff_worker::update_due_days(&site.store, &competition, now).await;
     started.unwrap();
     site.store.days().await.unwrap().len()
 }
@@ -86,7 +86,7 @@ async fn clock_step_is_reported_and_changes_nothing() {
         assert_eq!(again.expect("it was released").claim.job, claim.job);
         claim = other;
         // No day starts.
-        assert_eq!(start_due(&site).await, 1);
+        assert_eq!(update_due_days(&site).await, 1);
         let season = site.get("/api/v1/season", None).await.json(200);
         assert_eq!(season["today"], "2026-03-01");
         site.set_system_clock(SignedDuration::ZERO);
@@ -95,7 +95,7 @@ async fn clock_step_is_reported_and_changes_nothing() {
     // A cutoff that the monotonic clock explains comes in time, although the system clock is wrong.
     site.set_system_clock(days(-1));
     site.next_day();
-    assert_eq!(start_due(&site).await, 2);
+    assert_eq!(update_due_days(&site).await, 2);
 }
 
 #[tokio::test]
@@ -115,7 +115,7 @@ async fn organiser_accepts_a_clock_step() {
     let one_day = json!({ "confirm": "86400 s ahead" });
     let refused = post(one_day.clone()).await;
     refused.problem(409, "not-confirmed", &["432000 s ahead"]);
-    assert_eq!(start_due(&site).await, 1);
+    assert_eq!(update_due_days(&site).await, 1);
     site.set_system_clock(days(1));
     assert_eq!(post(one_day.clone()).await.status, 204);
     site.get("/api/v1/health", None).await.json(200);
@@ -128,7 +128,7 @@ async fn organiser_accepts_a_clock_step() {
     let renewed = site.store.heartbeat(&claim, 0, LEASE_S, now).await;
     assert!(renewed.unwrap());
     // The cutoff of the second day is due, which is also the deadline of the first.
-    assert_eq!(start_due(&site).await, 2);
+    assert_eq!(update_due_days(&site).await, 2);
     let path = "/api/v1/events?limit=1&kind=clock_step_accepted";
     let log = site.get(path, Some(ADMIN)).await;
     assert_contains(&log.body, &["86400 s ahead"]);
@@ -209,7 +209,7 @@ async fn future_day_is_reported_and_can_be_voided() {
     assert_eq!(next_day().await, "2026-03-02");
     assert!(!main_text(&mut grace).await.contains("is in the future"));
     site.next_day();
-    assert_eq!(start_due(&site).await, 2);
+    assert_eq!(update_due_days(&site).await, 2);
     assert_eq!(next_day().await, "2026-03-03");
     let again = site.store.start_day(Actor::Operator, stage, site.now());
     assert!(again.await.is_err(), "a day has one cutoff");

@@ -43,7 +43,7 @@ async fn claim_shard(site: &Site) -> (JobClaim, BundleRef, Grant) {
         bundles: vec![bundle.clone()],
         write_scope: WriteScope::None,
         expected_recording: ExpectedRecording::None,
-        program: String::new(),
+        program_blake3: String::new(),
     };
     (claim, bundle, grant)
 }

@@ -108,7 +108,7 @@ impl<'a> SidePlayer<'a> {
             asked_at: Instant::now(),
             result: None,
             wait: None,
-            log: Log::new(env.limits.stderr_tail_bytes),
+            log: Log::new(env.limits.stderr_kept_bytes),
             max_host_interference_s: 0.0,
         }
     }

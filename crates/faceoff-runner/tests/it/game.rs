@@ -22,7 +22,7 @@ pub fn spec(steps: u32) -> GameSpec {
         seed,
         mismatch_seed: seed.model_mismatch(),
         limits: GameLimits {
-            in_time_s: 60.0,
+            max_answer_s: 60.0,
             restart_s: 600.0,
             ..GameLimits::default()
         },
@@ -193,7 +193,7 @@ fn side_file_holds_nothing_of_the_other_side_and_no_seed() {
 fn late_answers_are_dropped_and_cost_only_their_side() {
     // Only deliberate sleeps are late: the bound is far above the answer times on a busy host.
     let mut spec = spec(60);
-    spec.limits.in_time_s = 2.0;
+    spec.limits.max_answer_s = 2.0;
     let slow = Agent::with_hooks(
         "def on_step(step, answer):\n    \
          answer['action'][0][0] += 0.2\n    \
@@ -214,7 +214,7 @@ fn late_answers_are_dropped_and_cost_only_their_side() {
 #[test]
 fn always_late_agent_never_moves_its_arm() {
     let mut spec = spec(200);
-    spec.limits.in_time_s = 1e-9;
+    spec.limits.max_answer_s = 1e-9;
     let swings = Agent::with_hooks(
         "def on_step(step, answer):\n    \
          answer['action'][0][0] += 0.5; return json.dumps(answer)",
@@ -403,7 +403,7 @@ fn diagnosis_of_one_side_is_not_on_the_others_clock() {
     env.time.bye_s = 3.0;
     let mut spec = spec(10);
     // At most the wait for the other agent's exit, and far more than answer times on a busy host.
-    spec.limits.in_time_s = 3.0;
+    spec.limits.max_answer_s = 3.0;
     for agents in [[&closing, &behaving], [&behaving, &closing]] {
         let out = tempfile::tempdir().unwrap();
         let report = play_in(&spec, agents, [&env; 2], out.path());

@@ -35,7 +35,7 @@ fn output_flood_is_read_only_on_demand() {
 #[test]
 fn log_flood_blocks_no_answer_and_log_stays_bounded() {
     let subject =
-        Subject::new("floods", &["stderr"]).with_limits(|limits| limits.stderr_tail_bytes = 1000);
+        Subject::new("floods", &["stderr"]).with_limits(|limits| limits.stderr_kept_bytes = 1000);
     let mut agent = subject.spawn();
     for number in 0..200 {
         expect_echo(&mut agent, &number.to_string());

@@ -52,7 +52,7 @@ pub struct GameEntry {
     #[serde(default, skip_serializing_if = "has_no_forfeit")]
     pub forfeit: [Option<Forfeit>; 2],
     /// What the game counts after a forfeit; absent: 10 : 0.
-    #[serde(default, skip_serializing_if = "ForfeitScore::is_first")]
+    #[serde(default, skip_serializing_if = "ForfeitScore::is_legacy")]
     pub forfeit_score: ForfeitScore,
     /// Submissions of the two teams, if each is to have its own rating.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -71,7 +71,7 @@ pub struct GameScore {
     /// `played`, `forfeit` or `both_forfeit`.
     pub end: String,
     /// What the game counts after a forfeit; absent: 10 : 0, or a game without a forfeit.
-    #[serde(default, skip_serializing_if = "ForfeitScore::is_first")]
+    #[serde(default, skip_serializing_if = "ForfeitScore::is_legacy")]
     pub forfeit_score: ForfeitScore,
 }
 

@@ -78,7 +78,7 @@ pub(crate) async fn receive(
     let file = create_temp_file(dir)?;
     let mut writer = tokio::fs::File::from_std(file.reopen().map_err(Problem::internal)?);
     let mut hasher = blake3::Hasher::new();
-    let mut first_bytes = Vec::with_capacity(ArchiveFormat::LONGEST_MAGIC);
+    let mut first_bytes = Vec::with_capacity(ArchiveFormat::DETECTION_BYTES);
     let mut format = None;
     let mut bytes = 0;
     while let Some(chunk) = body.next_chunk().await? {
@@ -87,10 +87,10 @@ pub(crate) async fn receive(
             return Err((limit.make_problem)(None));
         }
         if format.is_none() {
-            let missing_bytes = ArchiveFormat::LONGEST_MAGIC - first_bytes.len();
+            let missing_bytes = ArchiveFormat::DETECTION_BYTES - first_bytes.len();
             first_bytes.extend_from_slice(&chunk[..missing_bytes.min(chunk.len())]);
             format = ArchiveFormat::detect(&first_bytes);
-            if format.is_none() && first_bytes.len() == ArchiveFormat::LONGEST_MAGIC {
+            if format.is_none() && first_bytes.len() == ArchiveFormat::DETECTION_BYTES {
                 return Err(not_an_archive(&first_bytes));
             }
         }

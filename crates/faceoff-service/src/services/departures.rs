@@ -51,7 +51,7 @@ fn preview(state: &TournamentState, departure: &PlannedDeparture<'_>) -> Result<
             "{name} will leave the tournament, whose first round has not started. Its unfinished test and friendly games \
              will be cancelled. It may enter again"
         )
-    } else if state.tournament.rules.plays_on(departure.kind) {
+    } else if state.tournament.rules.finishes_round(departure.kind) {
         format!(
             "{name} will be withdrawn for good. Its games of a running round will still be played and count, but it will not \
              play in later rounds. Its unfinished test and friendly games will be cancelled. {reason}"

@@ -131,7 +131,7 @@ async fn append(
             let Some(chunk) = chunk? else {
                 return Ok(());
             };
-            let is_start = received == 0 && chunk.len() >= ArchiveFormat::LONGEST_MAGIC;
+            let is_start = received == 0 && chunk.len() >= ArchiveFormat::DETECTION_BYTES;
             if is_start && ArchiveFormat::detect(&chunk).is_none() {
                 // Before all the rest is sent.
                 return Err(bundle_stream::not_an_archive(&chunk));
@@ -201,8 +201,8 @@ fn read(path: PathBuf, expected: blake3::Hash) -> Result<ReceivedBundle, Problem
         }
         Err(error) => return Err(Problem::internal(error)),
     };
-    let mut first_bytes = Vec::with_capacity(ArchiveFormat::LONGEST_MAGIC);
-    let mut start = (&mut file).take(ArchiveFormat::LONGEST_MAGIC as u64);
+    let mut first_bytes = Vec::with_capacity(ArchiveFormat::DETECTION_BYTES);
+    let mut start = (&mut file).take(ArchiveFormat::DETECTION_BYTES as u64);
     start
         .read_to_end(&mut first_bytes)
         .map_err(Problem::internal)?;

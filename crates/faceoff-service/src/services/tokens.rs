@@ -10,12 +10,12 @@ use crate::{
     views::{credentials, token},
 };
 use faceoff_api::{
-    requests::{self, Made},
+    requests::{self, CreatedWithToken},
     token::{Secret, SecretKind},
     views::{credentials::RevokedTokenView, token::NewTokenView},
 };
 use faceoff_store::{
-    EndMade, NewToken, Principal, StoreError, Token, TokenKind, TokenOwner, TokensOf,
+    CreatedCredentials, NewToken, Principal, StoreError, Token, TokenKind, TokenOwner, TokensOf,
 };
 use faceoff_types::{TeamId, TokenId};
 
@@ -180,7 +180,7 @@ pub async fn revoke_token(
     app: &AppState,
     caller: &Caller,
     id: TokenId,
-    made: Option<Made>,
+    made: Option<CreatedWithToken>,
 ) -> Result<RevokedTokenView, Problem> {
     let token = find(app, caller, id).await?;
     let is_own = match (&caller.principal, token.owner) {
@@ -191,10 +191,14 @@ pub async fn revoke_token(
         _ => false,
     };
     let now = app.config.clock.now();
-    let default = if is_own { Made::Keep } else { Made::End };
+    let default = if is_own {
+        CreatedWithToken::Keep
+    } else {
+        CreatedWithToken::End
+    };
     let made = match made.unwrap_or(default) {
-        Made::Keep => EndMade::Keep,
-        Made::End => EndMade::Except(Some(caller.token.id)),
+        CreatedWithToken::Keep => CreatedCredentials::Keep,
+        CreatedWithToken::End => CreatedCredentials::EndExcept(Some(caller.token.id)),
     };
     let revoked = app
         .store

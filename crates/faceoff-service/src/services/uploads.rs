@@ -192,7 +192,7 @@ fn file_name(claimed: &str, format: ArchiveFormat) -> String {
     if stem.is_empty() {
         format!("agent.{}", format.extension())
     } else if format
-        .names()
+        .accepted_extensions()
         .iter()
         .any(|extension| stem.to_lowercase().ends_with(extension))
     {

@@ -177,7 +177,7 @@ pub async fn build(
         weights: app.config.competition().weights(&variation),
         tier_bounds: app.config.competition().tier_bounds(&variation),
         perturbations: (!variation.perturbations.is_empty()).then_some(variation.perturbations),
-        standings: stage.settings.standings,
+        standings: stage.settings.counting_result,
         rows_by,
         day: scope.last_day,
         blind: stage.settings.blind,

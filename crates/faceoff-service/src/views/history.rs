@@ -69,12 +69,12 @@ pub async fn query(
     });
     let final_cutoff = app.store.final_cutoff(stage.id).await?;
     let final_day = final_cutoff.map(|cutoff_at| stage.day(cutoff_at).date);
-    let rows_by = |day: Date| match (requested_result, stage.settings.standings) {
+    let rows_by = |day: Date| match (requested_result, stage.settings.counting_result) {
         (Some(counting_result), _) => counting_result,
         (None, CountingResult::Final) if final_day.is_none_or(|final_day| day < final_day) => {
             CountingResult::Latest
         }
-        (None, standings) => standings,
+        (None, counting_result) => counting_result,
     };
     let rows = rows(
         records,
@@ -89,7 +89,7 @@ pub async fn query(
         stage: stage.id,
         stage_name: stage.name,
         revision,
-        standings: stage.settings.standings,
+        standings: stage.settings.counting_result,
         blind: stage.settings.blind,
         provisional: stage.sign_off.is_none(),
         by: requested_result,

@@ -85,7 +85,7 @@ impl Store {
                             let claim = JobClaim {
                                 job: leased.id.0,
                                 nonce,
-                                worker: worker.to_owned(),
+                                holder: worker.to_owned(),
                                 lease_until: now.saturating_add(lease).unwrap_or(Timestamp::MAX),
                             };
                             return Ok(Some(ClaimedJob { claim, job }));

@@ -111,17 +111,17 @@ impl Store {
     /// Deletes tokens, sessions and invitations that ended at least [`ENDED_CREDENTIALS_KEPT_FOR`] ago. Accepted invitations stay:
     /// they say who invited whom. Returns the number of deleted rows. An interrupted call is completed by the next one.
     #[boxed]
-    pub async fn forget_ended_credentials(&self, now: Timestamp) -> Result<usize> {
+    pub async fn delete_ended_credentials(&self, now: Timestamp) -> Result<usize> {
         let ended_before = earlier(now, ENDED_CREDENTIALS_KEPT_FOR);
-        let mut forgotten = 0;
+        let mut total = 0;
         loop {
             let deleted = self.write(Actor::Server, now, async |tx| {
                 let tokens = tokens::forget_ended(tx, ended_before, FORGOTTEN_AT_ONCE).await?;
                 Ok(tokens + invitations::forget_ended(tx, ended_before, FORGOTTEN_AT_ONCE).await?)
             });
             match deleted.await? {
-                0 => return Ok(forgotten),
-                deleted => forgotten += deleted,
+                0 => return Ok(total),
+                deleted => total += deleted,
             }
         }
     }

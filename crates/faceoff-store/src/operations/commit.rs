@@ -46,7 +46,7 @@ impl Store {
         now: Timestamp,
         commit: impl AsyncFnOnce(&mut Tx, Purpose) -> Result<()>,
     ) -> Result<CommitOutcome> {
-        let actor = Actor::Worker(claim.worker.clone());
+        let actor = Actor::Worker(claim.holder.clone());
         self.write(actor, now, async |tx| {
             let kind = match queue::claim_state(tx, claim).await? {
                 ClaimState::Leased { kind } => kind,

@@ -25,7 +25,7 @@ impl Store {
         lease_s: u32,
         now: Timestamp,
     ) -> Result<bool> {
-        let actor = Actor::Worker(claim.worker.clone());
+        let actor = Actor::Worker(claim.holder.clone());
         self.write(actor, now, async |tx| {
             let Some(kind) = queue::renew(tx, claim, episodes_done, lease_s, now).await? else {
                 return Ok(false);
@@ -38,7 +38,7 @@ impl Store {
         .await
     }
 
-    /// Transfers a lease that `claim.worker` took in advance to the worker that starts the job, extended to `lease_s`
+    /// Transfers a lease that `claim.holder` took in advance to the worker that starts the job, extended to `lease_s`
     /// seconds from now. False: the lease was lost, or another worker has started the job. So only one of several workers
     /// that got the same job runs it. That worker may repeat the call, since a response can get lost.
     #[boxed]

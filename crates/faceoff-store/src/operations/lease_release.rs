@@ -109,7 +109,7 @@ impl Store {
         reason: &str,
         now: Timestamp,
     ) -> Result<()> {
-        let actor = Actor::Worker(claim.worker.clone());
+        let actor = Actor::Worker(claim.holder.clone());
         self.write(actor, now, async |tx| {
             let ClaimState::Leased { kind } = queue::claim_state(tx, claim).await? else {
                 return Ok(());
@@ -142,11 +142,11 @@ impl Store {
         self.release_after(claim, 0, false, now).await
     }
 
-    /// Releases a job that was leased in advance and not started, if `claim.worker` still holds the lease. False if another
+    /// Releases a job that was leased in advance and not started, if `claim.holder` still holds the lease. False if another
     /// worker holds it, or it is lost. The attempt does not count.
     #[boxed]
     pub async fn release_unstarted(&self, claim: &JobClaim, now: Timestamp) -> Result<bool> {
-        let actor = Actor::Worker(claim.worker.clone());
+        let actor = Actor::Worker(claim.holder.clone());
         self.write(actor, now, async |tx| {
             let ClaimState::Leased { kind } = queue::claim_state(tx, claim).await? else {
                 return Ok(false);
@@ -187,7 +187,7 @@ impl Store {
         out_of_space: bool,
         now: Timestamp,
     ) -> Result<()> {
-        let actor = Actor::Worker(claim.worker.clone());
+        let actor = Actor::Worker(claim.holder.clone());
         self.write(actor, now, async |tx| {
             match queue::claim_state(tx, claim).await? {
                 ClaimState::Leased { kind } => {

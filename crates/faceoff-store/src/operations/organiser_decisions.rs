@@ -51,7 +51,8 @@ async fn leave_tournaments(tx: &mut Tx, team: TeamId, reason: &str) -> Result<()
         // A team that withdraws may play the round under way to its end.
         let takes_part = entrants.iter().any(|entrant| {
             let plays = entrant.departure.as_ref().is_none_or(|departure| {
-                tournament.rules.plays_on(departure.kind) && departure.from_round.get() > rounds
+                tournament.rules.finishes_round(departure.kind)
+                    && departure.from_round.get() > rounds
             });
             entrant.team == team && plays
         });

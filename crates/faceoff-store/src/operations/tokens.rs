@@ -59,13 +59,13 @@ pub struct NewToken {
     pub expires_at: Option<Timestamp>,
 }
 
-/// What happens to all that was made with a revoked token.
+/// What happens to the credentials that were created with a revoked token.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum EndMade {
-    /// It stays.
+pub enum CreatedCredentials {
+    /// They stay.
     Keep,
-    /// It ends, except the token of the request.
-    Except(Option<TokenId>),
+    /// They end, except the token of the request.
+    EndExcept(Option<TokenId>),
 }
 
 /// A token that was revoked, and what ended with it.
@@ -312,7 +312,7 @@ impl Store {
         &self,
         actor: Actor,
         id: TokenId,
-        made: EndMade,
+        made: CreatedCredentials,
         now: Timestamp,
     ) -> Result<RevokedToken> {
         self.write(actor, now, async |tx| {
@@ -321,8 +321,8 @@ impl Store {
                 revoke_token(tx, &token).await?;
             }
             let ended = match made {
-                EndMade::Keep => EndedCredentials::default(),
-                EndMade::Except(kept) => {
+                CreatedCredentials::Keep => EndedCredentials::default(),
+                CreatedCredentials::EndExcept(kept) => {
                     let reason = "the token with which it was made was revoked";
                     revoke_created_with(tx, id, kept, reason).await?
                 }

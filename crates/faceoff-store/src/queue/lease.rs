@@ -12,7 +12,7 @@ pub struct JobClaim {
     /// Unique to this lease.
     pub nonce: Uuid,
     /// The lease holder; events of changes under the lease name it as their actor.
-    pub worker: String,
+    pub holder: String,
     /// When the lease expires unless it is renewed.
     pub lease_until: Timestamp,
 }
@@ -90,11 +90,11 @@ pub(crate) async fn is_leased(
     Ok(leased.unwrap_or_default())
 }
 
-/// Is `claim.worker` still the lease holder, so that the lease was not transferred?
+/// Is `claim.holder` still the lease holder, so that the lease was not transferred?
 pub(crate) async fn is_holder(connection: &mut SqliteConnection, claim: &JobClaim) -> Result<bool> {
     let is_same_worker = sqlx::query_scalar!(
         r#"SELECT worker = ? AS "is_holder!: bool" FROM jobs WHERE id = ? AND nonce = ? AND state = 'leased'"#,
-        claim.worker,
+        claim.holder,
         Text(claim.job),
         Text(claim.nonce),
     )
@@ -133,7 +133,7 @@ pub(crate) async fn leases(tx: &mut Tx, holder: &str) -> Result<Vec<(JobClaim, S
         let claim = JobClaim {
             job: row.id.0,
             nonce: row.nonce.0,
-            worker: row.worker,
+            holder: row.worker,
             lease_until: row.lease_until.0,
         };
         (claim, row.kind)
@@ -141,7 +141,7 @@ pub(crate) async fn leases(tx: &mut Tx, holder: &str) -> Result<Vec<(JobClaim, S
     Ok(leases.collect())
 }
 
-/// Transfers the lease to another holder. False if neither `claim.worker` nor `new_holder` has it.
+/// Transfers the lease to another holder. False if neither `claim.holder` nor `new_holder` has it.
 pub(crate) async fn transfer(
     connection: &mut SqliteConnection,
     claim: &JobClaim,
@@ -153,7 +153,7 @@ pub(crate) async fn transfer(
         new_holder,
         Text(claim.job),
         Text(claim.nonce),
-        claim.worker,
+        claim.holder,
     )
     .execute(connection)
     .await?;

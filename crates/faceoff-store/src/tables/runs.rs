@@ -42,8 +42,8 @@ pub(crate) async fn insert(
     contestants: &[SubmissionId],
 ) -> Result<()> {
     let (id, plan) = (run.id, &run.plan);
-    let limits = (!plan.limits.is_none()).then_some(Json(&plan.limits));
-    let variation = (!plan.variation.is_none()).then_some(Json(&plan.variation));
+    let limits = (!plan.limits.is_empty()).then_some(Json(&plan.limits));
+    let variation = (!plan.variation.is_empty()).then_some(Json(&plan.variation));
     sqlx::query!(
         "INSERT INTO runs (id, profile, seed, tasks, episodes_per_task, episodes_per_shard, max_faults,
                            keeps_recordings, ruleset, variation, limits, state)

@@ -36,7 +36,7 @@ impl Shard {
 pub struct ShardCommit {
     /// One outcome per episode, in order; fewer only if the shard was stopped by faults.
     pub outcomes: Vec<EpisodeOutcome>,
-    /// Tail of the agent's standard error.
+    /// The stored part of the agent's standard error: its beginning and its end.
     pub log: String,
     /// Was the shard stopped because the agent's faults in it exceeded the plan's limit?
     pub stopped_by_faults: bool,

@@ -719,7 +719,7 @@ async fn migration_keeps_leases_and_failure_counts() {
     let claim = JobClaim {
         job: id(1202),
         nonce: id(51_202),
-        worker: "old/slot-0".into(),
+        holder: "old/slot-0".into(),
         lease_until: f.now,
     };
     assert!(f.store.heartbeat(&claim, 1, LEASE_S, f.now).await.unwrap());

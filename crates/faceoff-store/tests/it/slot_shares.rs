@@ -20,9 +20,9 @@ enum JobKind {
     Ablation,
 }
 
-/// A job that a slot has run.
+/// A job that a slot has claimed, with its simulated start and end.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct RunJob {
+struct JobRecord {
     /// Name of the team; empty for a scoring or an ablation.
     team: &'static str,
     kind: JobKind,
@@ -41,8 +41,8 @@ struct Slots {
     /// When each slot becomes free, in seconds since `started_at`, and the job that it runs until then.
     slots: Vec<(i64, Option<(JobClaim, Job)>)>,
     started_at: jiff::Timestamp,
-    /// The jobs that the slots have run, in the order of their claims.
-    run_jobs: Vec<RunJob>,
+    /// The claimed jobs, in the order of their claims.
+    job_records: Vec<JobRecord>,
 }
 
 impl Slots {
@@ -55,7 +55,7 @@ impl Slots {
             evaluations: BTreeMap::new(),
             slots: (0..slot_count).map(|_| (0, None)).collect(),
             started_at,
-            run_jobs: Vec::new(),
+            job_records: Vec::new(),
         }
     }
 
@@ -111,7 +111,7 @@ impl Slots {
     async fn run(
         &mut self,
         duration_s: impl Fn(&'static str, JobKind) -> i64,
-        stops: impl Fn(&[RunJob]) -> bool,
+        stops: impl Fn(&[JobRecord]) -> bool,
     ) {
         loop {
             let index = (0..self.slots.len())
@@ -122,7 +122,7 @@ impl Slots {
             if let Some((claim, job)) = completed_job {
                 self.commit(&claim, job).await;
             }
-            let next_job = match stops(&self.run_jobs) {
+            let next_job = match stops(&self.job_records) {
                 true => None,
                 false => self
                     .f
@@ -135,7 +135,7 @@ impl Slots {
                 Some(ClaimedJob { claim, job }) => {
                     let (team, kind) = self.team_and_kind(&job).await;
                     let end_s = second + duration_s(team, kind);
-                    self.run_jobs.push(RunJob {
+                    self.job_records.push(JobRecord {
                         team,
                         kind,
                         start_s: second,
@@ -186,15 +186,15 @@ impl Slots {
 
     /// Teams and kinds of the jobs, in the order of their claims.
     fn claim_order(&self) -> Vec<(&'static str, JobKind)> {
-        self.run_jobs
+        self.job_records
             .iter()
             .map(|job| (job.team, job.kind))
             .collect()
     }
 
     /// Total slot time of the matching jobs, in seconds.
-    fn slot_time_s(run_jobs: &[RunJob], matches: impl Fn(&RunJob) -> bool) -> i64 {
-        run_jobs
+    fn slot_time_s(job_records: &[JobRecord], matches: impl Fn(&JobRecord) -> bool) -> i64 {
+        job_records
             .iter()
             .filter(|job| matches(job))
             .map(|job| job.end_s - job.start_s)
@@ -240,7 +240,7 @@ impl TestStore {
 }
 
 /// Runs the slots until no job is left.
-const NEVER: fn(&[RunJob]) -> bool = |_| false;
+const NEVER: fn(&[JobRecord]) -> bool = |_| false;
 
 #[tokio::test]
 async fn slow_uploads_do_not_delay_other_teams() {
@@ -254,17 +254,17 @@ async fn slow_uploads_do_not_delay_other_teams() {
             }
             let duration_s = |_, kind| if kind == JobKind::Validation { 100 } else { 10 };
             s.run(duration_s, NEVER).await;
-            let validations: Vec<usize> = (0..s.run_jobs.len())
-                .filter(|index| s.run_jobs[*index].kind == JobKind::Validation)
+            let validations: Vec<usize> = (0..s.job_records.len())
+                .filter(|index| s.job_records[*index].kind == JobKind::Validation)
                 .collect();
             assert_eq!(validations.len(), uploads);
             // Ten shards take as long as one validation run.
             for pair in validations.windows(2) {
-                let shards_left = s.run_jobs[pair[1]..]
+                let shards_left = s.job_records[pair[1]..]
                     .iter()
                     .filter(|job| job.kind == JobKind::Shard)
                     .count();
-                let shards_between = s.run_jobs[pair[0]..pair[1]]
+                let shards_between = s.job_records[pair[0]..pair[1]]
                     .iter()
                     .filter(|job| job.kind == JobKind::Shard)
                     .count();
@@ -279,18 +279,18 @@ async fn slow_uploads_do_not_delay_other_teams() {
 }
 
 #[tokio::test]
-async fn upload_flood_delays_other_upload_by_one() {
+async fn upload_flood_delays_other_team_by_one_job() {
     let mut s = Slots::new(1).await;
     let flood = s.create_team("Flood").await;
     for _ in 0..20 {
         s.f.upload(&flood).await;
     }
-    s.run(|_, _| 60, |run_jobs| run_jobs.len() == 3).await;
+    s.run(|_, _| 60, |job_records| job_records.len() == 3).await;
     let other = s.create_team("Other").await;
     s.f.upload(&other).await;
     s.f.upload(&other).await;
-    s.run(|_, _| 60, |run_jobs| run_jobs.len() == 7).await;
-    let teams: Vec<_> = s.run_jobs.iter().map(|job| job.team).collect();
+    s.run(|_, _| 60, |job_records| job_records.len() == 7).await;
+    let teams: Vec<_> = s.job_records.iter().map(|job| job.team).collect();
     assert_eq!(
         teams,
         [
@@ -317,15 +317,15 @@ async fn slot_time_is_equal_for_waiting_teams() {
             };
             s.run(duration_s, NEVER).await;
             assert_eq!(
-                s.run_jobs
+                s.job_records
                     .iter()
                     .filter(|job| job.kind == JobKind::Shard)
                     .count(),
                 3 + 15 + 60
             );
             // While all three teams have queued jobs, none is ahead by more than one job per slot.
-            for end in 1..s.run_jobs.len() {
-                let (before, after) = s.run_jobs.split_at(end);
+            for end in 1..s.job_records.len() {
+                let (before, after) = s.job_records.split_at(end);
                 let is_waiting = |name| after.iter().any(|job| job.team == name);
                 if !teams.iter().all(|(name, ..)| is_waiting(*name)) {
                     break;
@@ -346,12 +346,13 @@ async fn slot_time_is_equal_for_waiting_teams() {
 async fn running_jobs_count_as_slot_time() {
     let mut s = Slots::new(4).await;
     s.queue_evaluations(&[("A", 9), ("B", 9), ("C", 9)]).await;
-    s.run(|_, _| 1000, |run_jobs| run_jobs.len() == 6).await;
-    let mut first_teams: Vec<_> = s.run_jobs[..3].iter().map(|job| job.team).collect();
+    s.run(|_, _| 1000, |job_records| job_records.len() == 6)
+        .await;
+    let mut first_teams: Vec<_> = s.job_records[..3].iter().map(|job| job.team).collect();
     first_teams.sort_unstable();
     assert_eq!(first_teams, ["A", "B", "C"]);
     let mut job_counts = BTreeMap::new();
-    for job in &s.run_jobs {
+    for job in &s.job_records {
         *job_counts.entry(job.team).or_insert(0) += 1;
     }
     assert!(
@@ -365,11 +366,13 @@ async fn running_jobs_count_as_slot_time() {
 async fn slot_time_credit_expires_after_a_pause() {
     let mut s = Slots::new(1).await;
     s.queue_evaluations(&[("Busy", 60)]).await;
-    s.run(|_, _| 60, |run_jobs| run_jobs.len() == 30).await;
+    s.run(|_, _| 60, |job_records| job_records.len() == 30)
+        .await;
     // From now on two teams share equally: the new team does not catch up on the half hour that it had no jobs.
     s.queue_evaluations(&[("New", 30)]).await;
-    s.run(|_, _| 60, |run_jobs| run_jobs.len() == 50).await;
-    let with_new = &s.run_jobs[30..];
+    s.run(|_, _| 60, |job_records| job_records.len() == 50)
+        .await;
+    let with_new = &s.job_records[30..];
     let sequences = with_new.chunk_by(|a, b| a.team == b.team).map(<[_]>::len);
     assert_eq!(
         sequences.max(),
@@ -382,8 +385,9 @@ async fn slot_time_credit_expires_after_a_pause() {
     for _ in 0..10 {
         s.f.upload(&third).await;
     }
-    s.run(|_, _| 60, |run_jobs| run_jobs.len() == 70).await;
-    let with_third = &s.run_jobs[50..];
+    s.run(|_, _| 60, |job_records| job_records.len() == 70)
+        .await;
+    let with_third = &s.job_records[50..];
     let sequences = with_third.chunk_by(|a, b| a.kind == b.kind).map(<[_]>::len);
     assert_eq!(
         sequences.max(),
@@ -660,8 +664,8 @@ async fn slot_time_is_shared_by_teams_and_job_kinds() {
         )
         .await;
         let max_difference = MAX_DURATION_S * (1 + slots as i64);
-        for end in 1..s.run_jobs.len() {
-            let (before, after) = s.run_jobs.split_at(end);
+        for end in 1..s.job_records.len() {
+            let (before, after) = s.job_records.split_at(end);
             let is_waiting = |kind| after.iter().any(|job| job.kind == kind);
             let time_s = |kind| Slots::slot_time_s(before, |job| job.kind == kind);
             if is_waiting(JobKind::Validation) && is_waiting(JobKind::Shard) {

@@ -96,14 +96,24 @@ async fn token_is_valid_until_expired_rotated_or_revoked() {
     for _ in 0..2 {
         let revoked = f
             .store
-            .revoke_token(Actor::Operator, unlimited.id, EndMade::Keep, f.now)
+            .revoke_token(
+                Actor::Operator,
+                unlimited.id,
+                CreatedCredentials::Keep,
+                f.now,
+            )
             .await;
         assert_eq!(revoked.unwrap().token.revoked_at, Some(f.now));
     }
     assert_eq!(rejection(&f, 5).await, Some(TokenRejection::Revoked(f.now)));
     let unknown = f
         .store
-        .revoke_token(Actor::Operator, TokenId::new(), EndMade::Keep, f.now)
+        .revoke_token(
+            Actor::Operator,
+            TokenId::new(),
+            CreatedCredentials::Keep,
+            f.now,
+        )
         .await;
     assert!(matches!(unknown, Err(StoreError::NotFound("token"))));
     let events = f.store.events_after(0, 100).await.unwrap();
@@ -138,7 +148,7 @@ async fn token_use_is_recorded_and_tokens_are_limited() {
     assert_eq!(used.last_used_at, Some(f.now));
     // A revoked token does not count towards the limit.
     f.store
-        .revoke_token(Actor::Operator, used.id, EndMade::Keep, f.now)
+        .revoke_token(Actor::Operator, used.id, CreatedCredentials::Keep, f.now)
         .await
         .unwrap();
     f.store
@@ -189,7 +199,7 @@ async fn operator_token_follows_its_file_and_stays_revoked() {
         .revoke_token(
             Actor::Operator,
             other_operator_token.id,
-            EndMade::Keep,
+            CreatedCredentials::Keep,
             f.now,
         )
         .await
@@ -198,7 +208,7 @@ async fn operator_token_follows_its_file_and_stays_revoked() {
 }
 
 #[tokio::test]
-async fn makers_of_earlier_versions_come_from_the_log() {
+async fn creators_missing_in_earlier_versions_come_from_the_log() {
     let f = TestStore::new().await;
     let team = f.create_team("Alpha").await;
     let owner = TokenOwner::Team(team.id);
@@ -393,7 +403,7 @@ async fn tokens_and_invitations_are_listed_page_by_page() {
 }
 
 #[tokio::test]
-async fn ended_credentials_are_forgotten_after_a_month() {
+async fn ended_credentials_are_deleted_after_a_month() {
     let mut f = TestStore::new().await;
     let team = f.create_team("Alpha").await.id;
     add_user(&f, 100, "Ada", InvitationRole::Member(team)).await;
@@ -417,7 +427,7 @@ async fn ended_credentials_are_forgotten_after_a_month() {
     let leaf = create(&f, 3, Some((next, [9; 32]))).await;
     for ended in [middle, next] {
         f.store
-            .revoke_token(Actor::Operator, ended, EndMade::Keep, f.now)
+            .revoke_token(Actor::Operator, ended, CreatedCredentials::Keep, f.now)
             .await
             .unwrap();
     }
@@ -426,7 +436,12 @@ async fn ended_credentials_are_forgotten_after_a_month() {
     let of_operator = f.store.verify_token([7; 32], TokenKind::ApiToken, f.now);
     let of_operator = of_operator.await.unwrap().unwrap().token.id;
     f.store
-        .revoke_token(Actor::Operator, of_operator, EndMade::Keep, f.now)
+        .revoke_token(
+            Actor::Operator,
+            of_operator,
+            CreatedCredentials::Keep,
+            f.now,
+        )
         .await
         .unwrap();
     let expires_at = f.now + SignedDuration::from_hours(1);
@@ -448,12 +463,12 @@ async fn ended_credentials_are_forgotten_after_a_month() {
         .unwrap();
 
     f.advance_clock_s(30 * 24 * 3600 - 1);
-    assert_eq!(f.store.forget_ended_credentials(f.now).await.unwrap(), 0);
+    assert_eq!(f.store.delete_ended_credentials(f.now).await.unwrap(), 0);
     f.advance_clock_s(1);
-    assert_eq!(f.store.forget_ended_credentials(f.now).await.unwrap(), 2);
+    assert_eq!(f.store.delete_ended_credentials(f.now).await.unwrap(), 2);
     f.advance_clock_s(3600);
-    assert_eq!(f.store.forget_ended_credentials(f.now).await.unwrap(), 2);
-    assert_eq!(f.store.forget_ended_credentials(f.now).await.unwrap(), 0);
+    assert_eq!(f.store.delete_ended_credentials(f.now).await.unwrap(), 2);
+    assert_eq!(f.store.delete_ended_credentials(f.now).await.unwrap(), 0);
 
     let tokens = all_tokens(&f).await;
     let of_team: Vec<TokenId> = tokens
@@ -469,9 +484,14 @@ async fn ended_credentials_are_forgotten_after_a_month() {
     };
     assert!(matches!(accepted.state, InvitationState::Accepted { .. }));
     assert!(!f.store.set_operator_token([7; 32], f.now).await.unwrap());
-    // What was made with the forgotten tokens still ends with the token that made that one.
+    // A token that was created with a deleted token still ends with the token with which the deleted one was created.
     f.store
-        .revoke_token(Actor::Operator, root, EndMade::Except(None), f.now)
+        .revoke_token(
+            Actor::Operator,
+            root,
+            CreatedCredentials::EndExcept(None),
+            f.now,
+        )
         .await
         .unwrap();
     assert_eq!(rejection(&f, 3).await, Some(TokenRejection::Revoked(f.now)));

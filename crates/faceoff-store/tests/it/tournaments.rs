@@ -13,7 +13,7 @@ fn round(number: u32) -> RoundNumber {
 }
 
 /// A tournament with these rules and teams, each of which has a valid submission.
-async fn opened(
+async fn tournament_of(
     f: &TestStore,
     names: &[&str],
     rules: TournamentRules,
@@ -62,7 +62,7 @@ async fn start(
 
 /// A tournament of two teams whose first round, of one game, has started.
 async fn one_game(f: &TestStore, rules: TournamentRules) -> (Tournament, Vec<TeamId>) {
-    let (cup, teams) = opened(f, &["A", "B"], rules).await;
+    let (cup, teams) = tournament_of(f, &["A", "B"], rules).await;
     let round = drawn(1, &[&[[teams[0], teams[1]]]], &[]);
     start(f, cup.id, &round).await.unwrap();
     (cup, teams)
@@ -70,7 +70,7 @@ async fn one_game(f: &TestStore, rules: TournamentRules) -> (Tournament, Vec<Tea
 
 /// A tournament of three teams whose first round has started. Each of its three matchdays has one game.
 async fn three_games(f: &TestStore) -> (Tournament, [TeamId; 3]) {
-    let (cup, teams) = opened(
+    let (cup, teams) = tournament_of(
         f,
         &["A", "B", "C"],
         faceoff_airhockey::competition().tournament_rules(),
@@ -86,7 +86,7 @@ async fn record(f: &TestStore, id: TournamentId) -> TournamentRecord {
     f.store.tournament_record(id).await.unwrap()
 }
 
-fn result(recorded: bool) -> GameCommit {
+fn game_commit(recorded: bool) -> GameCommit {
     let hash = || "0".repeat(64);
     GameCommit {
         score: json!({"steps": 500}),
@@ -113,7 +113,10 @@ async fn claim_game(f: &TestStore) -> (JobClaim, GameId, u32) {
 async fn run_next_game(f: &TestStore) -> GameId {
     let (claim, game, _) = claim_game(f).await;
     let recorded = f.store.game(game).await.unwrap().purpose.keeps_recording();
-    let committed = f.store.commit_game(&claim, &result(recorded), f.now).await;
+    let committed = f
+        .store
+        .commit_game(&claim, &game_commit(recorded), f.now)
+        .await;
     assert_eq!(committed.unwrap(), CommitOutcome::Stored);
     game
 }
@@ -121,7 +124,7 @@ async fn run_next_game(f: &TestStore) -> GameId {
 #[tokio::test]
 async fn ban_requeues_running_games_and_lists_results() {
     let f = TestStore::new().await;
-    let (cup, teams) = opened(
+    let (cup, teams) = tournament_of(
         &f,
         &["A", "B", "C"],
         faceoff_airhockey::competition().tournament_rules(),
@@ -151,7 +154,7 @@ async fn ban_requeues_running_games_and_lists_results() {
     };
     let (claim, played) = claim_in_advance().await;
     begin(&claim, "remote/rack-1/slot-0").await;
-    let commit = result(true);
+    let commit = game_commit(true);
     let committed = f.store.commit_game(&claim, &commit, f.now);
     assert_eq!(committed.await.unwrap(), CommitOutcome::Stored);
     let rack: WorkerName = "rack-1".parse().unwrap();
@@ -195,7 +198,7 @@ fn departure(
 #[tokio::test]
 async fn round_starts_once_and_ends_with_its_last_game() {
     let mut f = TestStore::new().await;
-    let (cup, teams) = opened(
+    let (cup, teams) = tournament_of(
         &f,
         &["A", "B", "C"],
         faceoff_airhockey::competition().tournament_rules(),
@@ -284,7 +287,7 @@ async fn mirrored_halves_share_a_seed_and_swap_sides() {
 #[tokio::test]
 async fn round_needs_a_valid_submission_of_each_team() {
     let f = TestStore::new().await;
-    let (cup, teams) = opened(
+    let (cup, teams) = tournament_of(
         &f,
         &["A", "B"],
         faceoff_airhockey::competition().tournament_rules(),
@@ -301,10 +304,10 @@ async fn round_needs_a_valid_submission_of_each_team() {
         &["Late", "Wait for them, or let them leave"],
     );
     assert!(record(&f, cup.id).await.rounds.is_empty());
-    let out = departure(late.id, DepartureKind::Withdrawn, None);
+    let request = departure(late.id, DepartureKind::Withdrawn, None);
     let left = f
         .store
-        .leave_tournament(Actor::Operator, cup.id, &out, f.now)
+        .leave_tournament(Actor::Operator, cup.id, &request, f.now)
         .await;
     assert_eq!(
         left.unwrap(),
@@ -329,7 +332,7 @@ async fn round_refuses_runtimes_that_rules_exclude() {
         runtimes: Some(["python3".to_owned()].into_iter().collect()),
         ..faceoff_airhockey::competition().tournament_rules()
     };
-    let (cup, teams) = opened(&f, &["A", "B"], rules).await;
+    let (cup, teams) = tournament_of(&f, &["A", "B"], rules).await;
     assert_conflict(
         start(&f, cup.id, &drawn(1, &[&[[teams[0], teams[1]]]], &[])).await,
         &["A, B"],
@@ -348,7 +351,7 @@ async fn game_with_platform_faults_has_attempts_but_no_result() {
     assert_eq!(attempt, 2);
     let late = f
         .store
-        .commit_game(&lost, &result(true), f.now)
+        .commit_game(&lost, &game_commit(true), f.now)
         .await
         .unwrap();
     assert_eq!(late, CommitOutcome::LeaseLost);
@@ -495,7 +498,7 @@ async fn game_forecast_uses_recent_durations() {
     let (claim, _, _) = claim_game(&f).await;
     f.advance_clock_s(40);
     f.store
-        .commit_game(&claim, &result(true), f.now)
+        .commit_game(&claim, &game_commit(true), f.now)
         .await
         .unwrap();
     let at = |seconds| Some(f.now + jiff::SignedDuration::from_secs(seconds));
@@ -559,7 +562,7 @@ async fn departure_cancels_open_games() {
     ));
     let late = f
         .store
-        .commit_game(&claim, &result(true), f.now)
+        .commit_game(&claim, &game_commit(true), f.now)
         .await
         .unwrap();
     assert_eq!(late, CommitOutcome::LeaseLost);
@@ -596,7 +599,7 @@ async fn round_ends_after_rerun_of_a_game_of_an_earlier_round() {
         withdrawals: Withdrawals::AtOnce,
         ..faceoff_airhockey::competition().tournament_rules()
     };
-    let (cup, teams) = opened(&f, &["A", "B", "C"], rules).await;
+    let (cup, teams) = tournament_of(&f, &["A", "B", "C"], rules).await;
     let [a, b, c] = teams[..] else { panic!() };
     let first = drawn(1, &[&[[a, b]], &[[b, c]], &[[c, a]]], &[c, a, b]);
     start(&f, cup.id, &first).await.unwrap();
@@ -610,10 +613,10 @@ async fn round_ends_after_rerun_of_a_game_of_an_earlier_round() {
         .void_game(Actor::Operator, played, REASON, f.now)
         .await
         .unwrap();
-    let out = departure(c, DepartureKind::Withdrawn, None);
+    let request = departure(c, DepartureKind::Withdrawn, None);
     let left = f
         .store
-        .leave_tournament(Actor::Operator, cup.id, &out, f.now)
+        .leave_tournament(Actor::Operator, cup.id, &request, f.now)
         .await
         .unwrap();
     assert_eq!(
@@ -641,7 +644,7 @@ async fn withdrawn_team_plays_the_round_to_its_end() {
     let f = TestStore::new().await;
     let (cup, [a, b, c]) = three_games(&f).await;
     run_next_game(&f).await;
-    let out = departure(c, DepartureKind::Withdrawn, None);
+    let request = departure(c, DepartureKind::Withdrawn, None);
     let leave = async |request: &DepartureRequest| {
         f.store
             .leave_tournament(Actor::Operator, cup.id, request, f.now)
@@ -649,9 +652,9 @@ async fn withdrawn_team_plays_the_round_to_its_end() {
     };
     let early = departure(c, DepartureKind::Withdrawn, Some(round(1)));
     assert_conflict(leave(&early).await, &["from_round: expected 2"]);
-    let left = leave(&out).await.unwrap().unwrap();
+    let left = leave(&request).await.unwrap().unwrap();
     assert_eq!(left.from_round, round(2));
-    assert_conflict(leave(&out).await, &["has left the tournament already"]);
+    assert_conflict(leave(&request).await, &["has left the tournament already"]);
     let next = drawn(2, &[&[[b, a]]], &[]);
     assert_conflict(
         start(&f, cup.id, &next).await,
@@ -682,10 +685,10 @@ async fn cancelled_game_of_an_earlier_round_is_not_waited_for() {
         .void_game(Actor::Operator, of_c.id, REASON, f.now)
         .await
         .unwrap();
-    let out = departure(c, DepartureKind::Disqualified, None);
+    let request = departure(c, DepartureKind::Disqualified, None);
     let left = f
         .store
-        .leave_tournament(Actor::Operator, cup.id, &out, f.now);
+        .leave_tournament(Actor::Operator, cup.id, &request, f.now);
     assert_eq!(left.await.unwrap().unwrap().from_round, round(2));
     assert!(matches!(
         state(&f, of_c.id).await,
@@ -733,7 +736,7 @@ async fn withdrawal_does_not_delay_a_disqualification() {
 #[tokio::test]
 async fn disqualification_also_applies_after_withdrawal() {
     let f = TestStore::new().await;
-    let (cup, teams) = opened(
+    let (cup, teams) = tournament_of(
         &f,
         &["A", "B", "C"],
         faceoff_airhockey::competition().tournament_rules(),
@@ -750,18 +753,18 @@ async fn disqualification_also_applies_after_withdrawal() {
             .leave_tournament(Actor::Operator, cup.id, &request, f.now)
             .await
     };
-    let out = leave(departure(c, DepartureKind::Withdrawn, None))
+    let left = leave(departure(c, DepartureKind::Withdrawn, None))
         .await
         .unwrap();
-    assert_eq!(out.unwrap().from_round, round(2));
+    assert_eq!(left.unwrap().from_round, round(2));
     assert_conflict(
         leave(departure(c, DepartureKind::Disqualified, Some(round(3)))).await,
         &["from_round: expected 1 to 2"],
     );
-    let out = leave(departure(c, DepartureKind::Disqualified, Some(round(1))))
+    let left = leave(departure(c, DepartureKind::Disqualified, Some(round(1))))
         .await
         .unwrap();
-    assert_eq!(out.unwrap().kind, DepartureKind::Disqualified);
+    assert_eq!(left.unwrap().kind, DepartureKind::Disqualified);
     assert_conflict(
         leave(departure(c, DepartureKind::Disqualified, None)).await,
         &["has left the tournament already"],
@@ -805,16 +808,16 @@ async fn disqualification_also_applies_after_withdrawal() {
 #[tokio::test]
 async fn friendly_games_have_a_quota_and_wait_for_rounds() {
     let mut f = TestStore::new().await;
-    let (cup, teams) = opened(
+    let (cup, teams) = tournament_of(
         &f,
         &["A", "B", "Base"],
         faceoff_airhockey::competition().tournament_rules(),
     )
     .await;
     let [a, b, base] = teams[..] else { panic!() };
-    let out = departure(base, DepartureKind::Withdrawn, None);
+    let request = departure(base, DepartureKind::Withdrawn, None);
     f.store
-        .leave_tournament(Actor::Operator, cup.id, &out, f.now)
+        .leave_tournament(Actor::Operator, cup.id, &request, f.now)
         .await
         .unwrap();
     let test = async |f: &TestStore, by| {
@@ -828,7 +831,7 @@ async fn friendly_games_have_a_quota_and_wait_for_rounds() {
     let change = TournamentChange {
         baseline: Some(Some(baseline)),
         settings: Some(TournamentSettings {
-            free_games_per_day: 3,
+            test_and_friendly_games_per_day: 3,
             ..TournamentSettings::default()
         }),
         ..TournamentChange::default()
@@ -896,13 +899,13 @@ async fn friendly_games_have_a_quota_and_wait_for_rounds() {
 }
 
 #[tokio::test]
-async fn repeated_schedule_has_new_seeds_and_does_not_count() {
+async fn schedule_replay_has_new_seeds_and_does_not_count() {
     let f = TestStore::new().await;
-    let once = TournamentRules {
+    let one_round = TournamentRules {
         format: TournamentFormat::RoundRobin { rounds: round(1) },
         ..faceoff_airhockey::competition().tournament_rules()
     };
-    let (cup, teams) = opened(&f, &["A", "B"], once).await;
+    let (cup, teams) = tournament_of(&f, &["A", "B"], one_round).await;
     let replay = async |times| {
         f.store
             .request_schedule_replays(Actor::Operator, cup.id, times, f.now)
@@ -925,22 +928,26 @@ async fn repeated_schedule_has_new_seeds_and_does_not_count() {
         .rerun_game(Actor::Operator, game, f.now)
         .await
         .unwrap();
-    let (claim, counts, _) = claim_game(&f).await;
+    f.store
+        .rerun_game(Actor::Operator, game, f.now)
+        .await
+        .unwrap();
+    let (claim, counting_game, _) = claim_game(&f).await;
     assert!(matches!(
-        f.store.game(counts).await.unwrap().purpose,
+        f.store.game(counting_game).await.unwrap().purpose,
         GamePurpose::Round(_)
     ));
     f.store
-        .commit_game(&claim, &result(true), f.now)
+        .commit_game(&claim, &game_commit(true), f.now)
         .await
         .unwrap();
-    let (claim, replayed, _) = claim_game(&f).await;
+    let (claim, replay_game, _) = claim_game(&f).await;
     assert_conflict(
-        f.store.commit_game(&claim, &result(true), f.now).await,
+        f.store.commit_game(&claim, &game_commit(true), f.now).await,
         &["none of a game of a replayed schedule"],
     );
     f.store
-        .commit_game(&claim, &result(false), f.now)
+        .commit_game(&claim, &game_commit(false), f.now)
         .await
         .unwrap();
     assert_eq!(
@@ -955,7 +962,7 @@ async fn repeated_schedule_has_new_seeds_and_does_not_count() {
         .games(cup.id, GameFilter::ScheduleReplays)
         .await
         .unwrap();
-    assert_eq!(replays[0].id, replayed);
+    assert_eq!(replays[0].id, replay_game);
     let of_rounds = record(&f, cup.id).await.games;
     assert!(
         replays
@@ -988,7 +995,7 @@ async fn tournament_keeps_its_earlier_ruleset() {
 #[tokio::test]
 async fn closed_tournament_is_final_and_frees_bundles() {
     let f = TestStore::new().await;
-    let (cup, teams) = opened(
+    let (cup, teams) = tournament_of(
         &f,
         &["A", "B"],
         faceoff_airhockey::competition().tournament_rules(),
@@ -1052,7 +1059,7 @@ async fn closed_tournament_is_final_and_frees_bundles() {
             .await,
         &["was closed on"],
     );
-    let twice = NewTournament {
+    let same_name = NewTournament {
         name: "cup".parse().unwrap(),
         stage: None,
         rules: faceoff_airhockey::competition().tournament_rules(),
@@ -1061,7 +1068,7 @@ async fn closed_tournament_is_final_and_frees_bundles() {
     };
     let taken = f
         .store
-        .open_tournament(Actor::Operator, &twice, f.now)
+        .open_tournament(Actor::Operator, &same_name, f.now)
         .await;
     assert!(
         matches!(taken, Err(StoreError::TournamentNameTaken(_))),
@@ -1110,7 +1117,7 @@ async fn run_actions(actions: Vec<Action>) {
             Action::Commit(number) => {
                 if let Some((claim, game)) = pick(number)
                     && f.store
-                        .commit_game(&claim, &result(true), f.now)
+                        .commit_game(&claim, &game_commit(true), f.now)
                         .await
                         .unwrap()
                         == CommitOutcome::Stored
@@ -1149,7 +1156,7 @@ async fn run_actions(actions: Vec<Action>) {
     }) = f.claim().await
     {
         f.store
-            .commit_game(&claim, &result(true), f.now)
+            .commit_game(&claim, &game_commit(true), f.now)
             .await
             .unwrap();
         *committed.entry(game).or_default() += 1;

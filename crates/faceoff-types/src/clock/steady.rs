@@ -18,7 +18,7 @@ const MAX_CORRECTION: f64 = 500e-6;
 /// How often the expected time is corrected.
 const CORRECTION_INTERVAL: SignedDuration = SignedDuration::from_secs(1);
 
-/// Times without a date are durations since 1970, or of the monotonic clock.
+/// Values of `SignedDuration` are times since 1970 or readings of the monotonic clock.
 pub(super) struct SteadyClock {
     system: Box<dyn Fn() -> Timestamp + Send + Sync>,
     monotonic: Box<dyn Fn() -> SignedDuration + Send + Sync>,
@@ -33,12 +33,13 @@ struct State {
     expected_zero: SignedDuration,
     /// The monotonic clock at the last correction.
     corrected_at: SignedDuration,
-    /// As long as the clock is before the newest change of the database since the start.
+    /// Set as long as the clock, since the start of the process, has been behind the newest change of the database.
     behind: Option<BehindDatabase>,
 }
 
 impl State {
-    /// Follows the system clock, by which the zero of the monotonic clock has this time now.
+    /// Follows the system clock: `zero` is the time that it now gives to the zero of the monotonic clock, `deviation` its difference
+    /// from the expected one, `now` the reading of the monotonic clock.
     fn follow(&mut self, zero: SignedDuration, deviation: SignedDuration, now: SignedDuration) {
         self.zero = zero;
         let elapsed = now.saturating_sub(self.corrected_at);
@@ -72,7 +73,7 @@ impl SteadyClock {
         start: ClockStart,
     ) -> Self {
         let (system_at, corrected_at) = (system(), monotonic());
-        // An earlier process of this boot has accepted what the database has.
+        // If `zero_at` is known, an earlier process of the same boot has already compared its clock with the database.
         let behind = match (start.zero_at, start.newest_change_at) {
             (None, Some(newest_change_at)) => Some(BehindDatabase {
                 newest_change_at,

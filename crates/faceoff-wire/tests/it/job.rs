@@ -26,7 +26,7 @@ fn job(payload: JobPayload) -> JobSpec {
         lease: Lease {
             job_id: Uuid::from_u128(1),
             nonce: Uuid::from_u128(2),
-            slot: "worker/slot-0".into(),
+            holder: "worker/slot-0".into(),
             expires_at: "2026-03-01T06:00:30.25Z".parse().expect("an instant"),
             duration_s: 30,
         },
@@ -241,7 +241,7 @@ fn jobs_without_variation_round_trip_unchanged() {
         .set("disturbance", "sigma_n_per_m_s", magnitude);
     assert_round_trips(&changed);
 
-    let first_tiers: TierBounds = "0.5,1.5".parse().expect("bounds");
+    let legacy_tiers: TierBounds = "0.5,1.5".parse().expect("bounds");
     let meta = EvaluationMeta {
         profile: EVALUATION,
         seed: Seed::from_number(1),
@@ -250,7 +250,7 @@ fn jobs_without_variation_round_trip_unchanged() {
         ruleset: faceoff_airhockey::RULESET,
         variation: Variation::default(),
         task_weights: weights(),
-        tiers: Some(first_tiers),
+        tiers: Some(legacy_tiers),
     };
     let text = serde_json::to_string(&meta).expect("it is JSON");
     for key in ["\"weights", "tier_bounds", "perturbations", "variation"] {
@@ -277,11 +277,11 @@ fn scoring_job_names_the_tiers_of_its_competition() {
     };
     assert_eq!(meta.tier_bounds(), None);
     assert_round_trips(&meta);
-    let first_tiers: TierBounds = "0.5,1.5".parse().expect("bounds");
+    let legacy_tiers: TierBounds = "0.5,1.5".parse().expect("bounds");
     let mut json = serde_json::to_value(&meta).expect("it is JSON");
     json.as_object_mut().expect("an object").remove("tiers");
     let mut earlier: EvaluationMeta = serde_json::from_value(json).expect("it is read");
-    assert_eq!(earlier.tier_bounds(), Some(first_tiers));
+    assert_eq!(earlier.tier_bounds(), Some(legacy_tiers));
     let stage_bounds: TierBounds = "0.1,0.2".parse().expect("bounds");
     earlier.variation.tier_bounds = Some(stage_bounds);
     assert_eq!(earlier.tier_bounds(), Some(stage_bounds));

@@ -16,7 +16,7 @@ use faceoff_types::WorkerName;
 use faceoff_types::printable_excerpt;
 use faceoff_wire::{
     grant::Grant,
-    remote::{JobEnd, ResultMessage},
+    remote::{RemoteJobEnd, ResultMessage},
 };
 use futures::StreamExt as _;
 use std::{
@@ -40,11 +40,11 @@ const MAX_REASON_CHARS: usize = 500;
 /// Longest time without any answer of NATS. The client itself may wait forever for an answer that was lost with a connection.
 const NATS_TIMEOUT: Duration = Duration::from_secs(30);
 
-/// The answer of NATS, which ends a fetch of [`POLL_INTERVAL`] itself.
+/// Waits for an answer of NATS, for at most [`NATS_TIMEOUT`]. NATS itself ends a fetch without results after [`POLL_INTERVAL`].
 ///
 /// # Errors
 /// If there is none in time.
-async fn in_time<T>(answer: impl Future<Output = T>) -> anyhow::Result<T> {
+async fn with_nats_timeout<T>(answer: impl Future<Output = T>) -> anyhow::Result<T> {
     let answer = tokio::time::timeout(NATS_TIMEOUT, answer).await;
     answer.context("NATS has not answered in time while results were fetched")
 }
@@ -82,9 +82,11 @@ impl Dispatcher {
                 .max_messages(MAX_CONCURRENT_CHECKS - checks.len())
                 .expires(POLL_INTERVAL)
                 .messages();
-            let mut results = in_time(results).await?.context("fetching results")?;
+            let mut results = with_nats_timeout(results)
+                .await?
+                .context("fetching results")?;
             let mut is_empty = true;
-            while let Some(message) = in_time(results.next()).await? {
+            while let Some(message) = with_nats_timeout(results.next()).await? {
                 is_empty = false;
                 let message = message.map_err(|error| anyhow::anyhow!(error))?;
                 let dispatcher = Arc::clone(self);
@@ -99,7 +101,7 @@ impl Dispatcher {
             }
             if is_empty {
                 let checked = self.streams.check_results(&mut consumer, &mut undelivered);
-                in_time(checked).await??;
+                with_nats_timeout(checked).await??;
             }
         }
         Ok(())
@@ -140,7 +142,7 @@ impl Dispatcher {
                 }
                 self.pending_results.remove(lease.nonce);
                 self.unfinished_checks.finish(lease.nonce);
-                tracing::warn!(job = %lease.job_id, slot = lease.slot, "NATS has lost a result: the job is queued again");
+                tracing::warn!(job = %lease.job_id, slot = lease.holder, "NATS has lost a result: the job is queued again");
                 let server = self.server.clone();
                 let released = tokio::task::spawn_blocking(move || {
                     server.release(&lease, ReleaseReason::Interrupted)
@@ -173,9 +175,9 @@ impl Dispatcher {
             tracing::error!(job = %id, %worker, "a worker sent a result without a valid grant; ignored");
             return AckKind::Ack;
         };
-        if !result.lease.slot.starts_with(&worker.slot_holder("")) {
+        if !result.lease.holder.starts_with(&worker.slot_holder("")) {
             // The subject of the message names the worker; its slot is unknown.
-            result.lease.slot = worker.slot_holder("?");
+            result.lease.holder = worker.slot_holder("?");
         }
         let (workers, now) = (&self.server.live.workers, self.server.clock.now());
         match self.server.store.ban_reason(&worker).await {
@@ -204,17 +206,17 @@ impl Dispatcher {
                 return AckKind::Nak(Some(RETRY_AFTER));
             }
         };
-        if grant.program != self.remote.required.program
-            && matches!(result.end, JobEnd::Done { .. })
+        if grant.program_blake3 != self.remote.required.program_blake3
+            && matches!(result.end, RemoteJobEnd::Done { .. })
         {
             tracing::info!(job = %id, %worker, "the result is from another program version: the job is queued again");
-            result.end = JobEnd::Interrupted;
+            result.end = RemoteJobEnd::Interrupted;
         }
-        if let JobEnd::PlatformFault { reason } = &mut result.end {
+        if let RemoteJobEnd::PlatformFault { reason } = &mut result.end {
             *reason = printable_excerpt(reason, MAX_REASON_CHARS);
         }
-        let has_failed = matches!(result.end, JobEnd::PlatformFault { .. });
-        let was_played = matches!(result.end, JobEnd::Done { .. });
+        let has_failed = matches!(result.end, RemoteJobEnd::PlatformFault { .. });
+        let was_played = matches!(result.end, RemoteJobEnd::Done { .. });
         let record_failure = || {
             if let Some((jobs, until)) = workers.record_failure(worker.as_str(), id, now) {
                 tracing::warn!(%worker, jobs, %until, "all recent jobs of a worker failed; it gets none for a while");
@@ -260,8 +262,8 @@ impl Dispatcher {
             }
             Ok(Acceptance::Unchecked) => {
                 let reason = format!(
-                    "three checks of its result of job {id} ended the server or failed in it; if the server was ended from outside \
-                     each time, readmit the worker"
+                    "three checks of the worker's result of job {id} crashed or ended with the server; if the server was stopped \
+                     each time for another reason, readmit the worker"
                 );
                 match self.ban(&worker, &reason).await {
                     retry @ AckKind::Nak(_) => return retry,
@@ -317,7 +319,7 @@ impl Dispatcher {
         );
         let (episodes_done, bucket) = (grant.episodes(), self.bucket.clone());
         let mut storing = tokio::spawn(async move {
-            let bucket = bucket.filter(|_| matches!(result.end, JobEnd::Done { .. }));
+            let bucket = bucket.filter(|_| matches!(result.end, RemoteJobEnd::Done { .. }));
             if let Some(bucket) = &bucket
                 && server.store.is_leased(grant.job_id, grant.nonce).await?
             {

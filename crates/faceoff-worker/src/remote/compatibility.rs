@@ -9,11 +9,11 @@ pub(super) fn incompatibility(
     worker: &WorkerCapabilities,
     required: &WorkerCapabilities,
 ) -> Option<String> {
-    if worker.program != required.program {
+    if worker.program_blake3 != required.program_blake3 {
         return Some(format!(
             "the worker runs another program (version {}, BLAKE3 {}) than the server (version {}, BLAKE3 {}): only the same program \
              has the same results to the last bit; copy the server's to the worker's machine",
-            worker.version, worker.program, required.version, required.program
+            worker.version, worker.program_blake3, required.version, required.program_blake3
         ));
     }
     let offered = |name: &str| worker.runtimes.iter().find(|runtime| runtime.name == name);
@@ -117,7 +117,7 @@ mod tests {
     fn capabilities(program: &str, runtimes: &[(&str, RuntimeContent)]) -> WorkerCapabilities {
         let runtimes = runtimes.iter().cloned();
         WorkerCapabilities {
-            program: program.into(),
+            program_blake3: program.into(),
             version: "1".into(),
             runtimes: runtimes
                 .map(|(name, content)| RuntimeInventory {

@@ -56,7 +56,7 @@ pub async fn check_connection(
     let server = match response.await {
         Ok(WorkerResponse::Accepted) => Ok(()),
         Ok(WorkerResponse::Refused { reason }) => Err(reason),
-        Ok(WorkerResponse::Unknown) => Err("the server cannot answer now".to_owned()),
+        Ok(WorkerResponse::Unavailable) => Err("the server cannot answer now".to_owned()),
         Err(error) => Err(format!(
             "no server answers at NATS as nats.name = {:?}: {error:#}",
             nats.name

@@ -5,7 +5,7 @@ use super::{
     bucket::{Bucket, BucketConfig},
     connection::NatsConfig,
     grants::grant_for,
-    names::{ALL, Names, SERVER, UNCLAIMED},
+    names::{ALL, NOT_STARTED, Names, SERVER},
     pending_results::PendingResults,
     published_jobs::{PublishedJob, PublishedJobs},
     requests::RequestHandler,
@@ -168,7 +168,7 @@ pub async fn dispatch(
 async fn resume_leases(server: &LocalServer) -> anyhow::Result<()> {
     let (store, now) = (&server.store, server.clock.now());
     let resumed = async {
-        store.release_leases_of(UNCLAIMED, now).await?;
+        store.release_leases_of(NOT_STARTED, now).await?;
         let lease_s = server.lease_s.max(MIN_LEASE_AT_START_S);
         store
             .renew_leases_of(WorkerName::REMOTE, lease_s, now)
@@ -298,7 +298,7 @@ impl Dispatcher {
     /// Claims and publishes one job; returns false if there is none.
     async fn publish_next(&self) -> anyhow::Result<bool> {
         let server = self.server.clone();
-        let claimed = tokio::task::spawn_blocking(move || server.claim(UNCLAIMED)).await??;
+        let claimed = tokio::task::spawn_blocking(move || server.claim(NOT_STARTED)).await??;
         let ClaimResult::Job(job) = claimed else {
             return Ok(false);
         };
@@ -322,7 +322,7 @@ impl Dispatcher {
 
     /// Publishes a job and returns its sequence number in the stream.
     async fn publish(&self, job: JobSpec) -> anyhow::Result<u64> {
-        let grant = grant_for(&job, &self.remote.required.program);
+        let grant = grant_for(&job, &self.remote.required.program_blake3);
         let objects = match &self.bucket {
             Some(bucket) => {
                 let artifacts = self.server.store.artifacts();
@@ -336,7 +336,7 @@ impl Dispatcher {
             job,
             grant,
             files_url,
-            program: self.remote.required.program.clone(),
+            program_blake3: self.remote.required.program_blake3.clone(),
             objects,
         })?;
         let jetstream = &self.streams.jetstream;
@@ -361,7 +361,7 @@ impl Dispatcher {
 
     async fn requeue_job(&self, lease: Lease) {
         let (store, id, now) = (&self.server.store, lease.job_id, self.server.clock.now());
-        let claim = claim(&lease, UNCLAIMED);
+        let claim = claim(&lease, NOT_STARTED);
         match store.release_unstarted(&claim, now).await {
             Ok(true) => tracing::debug!(job = %id, "requeued: not started in time"),
             Ok(false) => {}

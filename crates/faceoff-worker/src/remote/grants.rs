@@ -10,11 +10,11 @@ use faceoff_store::StoreError;
 use faceoff_wire::{
     grant::{ExpectedRecording, Grant, GrantKey, WriteScope},
     job::{JobPayload, JobReport, JobSpec, Lease, OutputFiles},
-    remote::{JobEnd, ResultMessage},
+    remote::{RemoteJobEnd, ResultMessage},
 };
 
 /// The grant for a job. `program` is the hash of the server's program, which the worker must have, too.
-pub(super) fn grant_for(job: &JobSpec, program: &str) -> Grant {
+pub(super) fn grant_for(job: &JobSpec, program_blake3: &str) -> Grant {
     let (bundles, write_scope, expected_recording) = match &job.payload {
         JobPayload::Shard {
             agent,
@@ -58,7 +58,7 @@ pub(super) fn grant_for(job: &JobSpec, program: &str) -> Grant {
         bundles,
         write_scope,
         expected_recording,
-        program: program.to_owned(),
+        program_blake3: program_blake3.to_owned(),
     }
 }
 
@@ -103,10 +103,12 @@ pub(super) fn store_result(
 ) -> anyhow::Result<Acceptance> {
     let ResultMessage { lease, end, .. } = message;
     let released = match end {
-        JobEnd::Done { report } => return store_report(server, checks, grant, &lease, *report),
-        JobEnd::Interrupted => server.release(&lease, ReleaseReason::Interrupted),
-        JobEnd::FullDisk => server.release(&lease, ReleaseReason::FullDisk),
-        JobEnd::PlatformFault { reason } => {
+        RemoteJobEnd::Done { report } => {
+            return store_report(server, checks, grant, &lease, *report);
+        }
+        RemoteJobEnd::Interrupted => server.release(&lease, ReleaseReason::Interrupted),
+        RemoteJobEnd::FullDisk => server.release(&lease, ReleaseReason::FullDisk),
+        RemoteJobEnd::PlatformFault { reason } => {
             server.release(&lease, ReleaseReason::PlatformFault(&reason))
         }
     };
@@ -121,7 +123,7 @@ fn store_report(
     report: JobReport,
 ) -> anyhow::Result<Acceptance> {
     if !matches_grant(&report, grant) {
-        tracing::error!(job = %lease.job_id, slot = lease.slot, "a worker's report does not match its job");
+        tracing::error!(job = %lease.job_id, slot = lease.holder, "a worker's report does not match its job");
         let reason = ReleaseReason::PlatformFault("a worker's report did not match its job");
         server.release(lease, reason)?;
         return Ok(Acceptance::JobMismatch);
@@ -141,7 +143,7 @@ fn store_report(
         Ok(status) => Ok(status.into()),
         // A retry would be refused again.
         Err(error) if matches!(error.downcast_ref(), Some(StoreError::Conflict(_))) => {
-            tracing::error!(job = %lease.job_id, slot = lease.slot, %error, "a worker's report is not acceptable");
+            tracing::error!(job = %lease.job_id, slot = lease.holder, %error, "a worker's report is not acceptable");
             let reason = "a worker's report does not match its job";
             server.release(lease, ReleaseReason::PlatformFault(reason))?;
             Ok(Acceptance::JobMismatch)

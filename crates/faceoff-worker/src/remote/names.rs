@@ -83,8 +83,8 @@ pub(super) const JOBS_CONSUMER: &str = "workers";
 pub(super) const RESULTS_CONSUMER: &str = "server";
 /// All workers, in subjects.
 pub(super) const ALL: &str = "*";
-/// Lease holder of published jobs that no worker has started. No slot has this name, which the database contains.
-pub(super) const UNCLAIMED: &str = "given out";
+/// Lease holder of a published job that no worker has started. Jobs in the database have this text, and no slot can have this name.
+pub(super) const NOT_STARTED: &str = "given out";
 
 /// Is the text valid as a token of a subject and as a part of a stream's name?
 pub(super) fn is_subject_token(text: &str) -> bool {

@@ -7,7 +7,7 @@ use super::{
 };
 use anyhow::Context as _;
 use async_nats::jetstream::{Message, consumer::PullConsumer};
-use faceoff_wire::remote::{JobEnd, RemoteJob, WorkerRequest, WorkerResponse};
+use faceoff_wire::remote::{RemoteJob, RemoteJobEnd, WorkerRequest, WorkerResponse};
 use futures::StreamExt as _;
 use std::{
     sync::PoisonError,
@@ -41,7 +41,7 @@ impl ServerClient {
         let reason = match response {
             WorkerResponse::Accepted => None,
             WorkerResponse::Refused { reason } => Some(reason),
-            WorkerResponse::Unknown => return Ok(false),
+            WorkerResponse::Unavailable => return Ok(false),
         };
         let mut logged_refusal = self
             .link
@@ -105,7 +105,7 @@ impl ServerClient {
         let Some(mut job) = self.read_job(&message) else {
             return Ok(None);
         };
-        job.job.lease.slot = link.worker.slot_holder(slot);
+        job.job.lease.holder = link.worker.slot_holder(slot);
         Ok(self.start_job(&job, slot).await.then_some(job))
     }
 
@@ -120,7 +120,7 @@ impl ServerClient {
         match serde_json::from_slice::<RemoteJob>(&message.payload) {
             Ok(job) => {
                 logged_cause.clear();
-                if job.program == link.capabilities.program {
+                if job.program_blake3 == link.capabilities.program_blake3 {
                     return Some(job);
                 }
             }
@@ -159,12 +159,12 @@ impl ServerClient {
             cause = match link.request(&request).await {
                 Ok(WorkerResponse::Accepted) => return true,
                 Ok(WorkerResponse::Refused { .. }) => return false,
-                Ok(WorkerResponse::Unknown) => "the server cannot answer now".to_owned(),
+                Ok(WorkerResponse::Unavailable) => "the server cannot answer now".to_owned(),
                 Err(error) => format!("{error:#}"),
             };
         }
         tracing::warn!(job = %id, cause, "no response to the start of a job: it is released");
-        let sent = self.send_result(lease, &job.grant, JobEnd::Interrupted);
+        let sent = self.send_result(lease, &job.grant, RemoteJobEnd::Interrupted);
         let sent = tokio::time::timeout(REQUEST_TIMEOUT, sent).await;
         if let Err(error) = sent.map_err(anyhow::Error::from).flatten() {
             tracing::warn!(job = %id, cause = format!("{error:#}"), "the job could not be released; its lease will expire");

@@ -105,7 +105,7 @@ mod tests {
         let lease = |nonce| Lease {
             job_id: Uuid::from_u128(9),
             nonce: Uuid::from_u128(nonce),
-            slot: "remote/a/slot-0".into(),
+            holder: "remote/a/slot-0".into(),
             expires_at: Timestamp::UNIX_EPOCH,
             duration_s: 30,
         };

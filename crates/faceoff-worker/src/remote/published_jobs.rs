@@ -83,7 +83,7 @@ mod tests {
         let lease = |nonce| Lease {
             job_id: Uuid::from_u128(9),
             nonce: Uuid::from_u128(nonce),
-            slot: "unclaimed".into(),
+            holder: "unclaimed".into(),
             expires_at: Timestamp::UNIX_EPOCH,
             duration_s: 30,
         };

@@ -2,7 +2,7 @@
 
 use super::{
     compatibility::incompatibility,
-    names::{self, ALL, Names, UNCLAIMED},
+    names::{self, ALL, NOT_STARTED, Names},
     pending_results::PendingResults,
     published_jobs::PublishedJobs,
     streams::Streams,
@@ -134,7 +134,7 @@ impl RequestHandler {
         };
         let ban = match self.store.ban_reason(&worker).await {
             Ok(ban) => ban,
-            Err(error) => return unknown(&worker, &error),
+            Err(error) => return unavailable_response(&worker, &error),
         };
         let ban =
             ban.map(|reason| format!("the server accepts no results of this worker: {reason}"));
@@ -177,11 +177,12 @@ impl RequestHandler {
             WorkerRequest::RenewLease {
                 lease,
                 episodes_done,
-                trouble,
+                send_problem,
             } => {
-                let trouble = trouble.map(|problem| printable_excerpt(&problem, MAX_PROBLEM_CHARS));
+                let send_problem =
+                    send_problem.map(|problem| printable_excerpt(&problem, MAX_PROBLEM_CHARS));
                 let held = self.renew(&worker, &lease, episodes_done, renewals).await;
-                self.record_renewal(&worker, &lease, held, trouble.as_deref())
+                self.record_renewal(&worker, &lease, held, send_problem.as_deref())
             }
             WorkerRequest::ResultPending {
                 lease,
@@ -203,7 +204,7 @@ impl RequestHandler {
         match result {
             Ok(true) => WorkerResponse::Accepted,
             Ok(false) => refused("this worker does not have the lease"),
-            Err(error) => unknown(&worker, &error),
+            Err(error) => unavailable_response(&worker, &error),
         }
     }
 
@@ -214,7 +215,7 @@ impl RequestHandler {
         lease: &Lease,
         slot: &str,
     ) -> Result<bool, StoreError> {
-        let claim = claim(lease, UNCLAIMED);
+        let claim = claim(lease, NOT_STARTED);
         let now = self.clock.now();
         let holder = worker.slot_holder(slot);
         let is_started = self
@@ -254,11 +255,11 @@ impl RequestHandler {
             return Ok(true);
         }
         // A lease that does not name a slot of this worker is renewed in the name of the worker.
-        let is_own_slot = lease.slot.starts_with(&worker.slot_holder(""));
+        let is_own_slot = lease.holder.starts_with(&worker.slot_holder(""));
         let claim = claim(
             lease,
             if is_own_slot {
-                &lease.slot
+                &lease.holder
             } else {
                 worker.as_str()
             },
@@ -280,14 +281,14 @@ impl RequestHandler {
         worker: &WorkerName,
         lease: &Lease,
         held: Result<bool, StoreError>,
-        trouble: Option<&str>,
+        send_problem: Option<&str>,
     ) -> Result<bool, StoreError> {
         let workers = &self.live.workers;
-        match (&held, lease.slot.strip_prefix(&worker.slot_holder(""))) {
+        match (&held, lease.holder.strip_prefix(&worker.slot_holder(""))) {
             (Ok(true), Some(slot)) => {
                 let report = SlotReport {
                     description: None,
-                    problem: trouble,
+                    problem: send_problem,
                 };
                 workers.record_job(
                     worker.as_str(),
@@ -366,9 +367,9 @@ impl LiveEventBytes {
 }
 
 /// The response if the database cannot be read.
-fn unknown(worker: &WorkerName, error: &StoreError) -> WorkerResponse {
+fn unavailable_response(worker: &WorkerName, error: &StoreError) -> WorkerResponse {
     tracing::warn!(%worker, %error, "the database could not be read for a worker's request");
-    WorkerResponse::Unknown
+    WorkerResponse::Unavailable
 }
 
 fn response_for(reason: Option<String>) -> WorkerResponse {

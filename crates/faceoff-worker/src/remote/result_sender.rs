@@ -6,7 +6,7 @@ use anyhow::Context as _;
 use async_nats::HeaderMap;
 use faceoff_wire::{
     job::Lease,
-    remote::{JobEnd, ResultMessage},
+    remote::{RemoteJobEnd, ResultMessage},
 };
 use std::time::{Duration, Instant};
 
@@ -23,9 +23,9 @@ impl ServerClient {
         &self,
         lease: &Lease,
         grant: &str,
-        end: JobEnd,
+        end: RemoteJobEnd,
     ) -> anyhow::Result<Option<u64>> {
-        let is_done = matches!(end, JobEnd::Done { .. });
+        let is_done = matches!(end, RemoteJobEnd::Done { .. });
         let message = ResultMessage {
             lease: lease.clone(),
             grant: grant.to_owned(),
@@ -62,7 +62,7 @@ impl ServerClient {
                 Ok(stored) => return Ok(Some(stored.sequence)),
                 Err(error) => error,
             };
-            if is_done && self.has_ended() {
+            if is_done && self.must_stop_job() {
                 return Ok(None);
             }
             if error.is::<TooLarge>() && started_at.elapsed() >= give_up_after {

@@ -12,7 +12,9 @@ use faceoff_dataset::CLIPS_FILE;
 use faceoff_types::{BundleRef, GameId};
 use faceoff_wire::{
     job::{JobReport, Lease},
-    remote::{JobEnd, LiveGameMessage, LiveGameUpdate, RemoteJob, WorkerRequest, WorkerResponse},
+    remote::{
+        LiveGameMessage, LiveGameUpdate, RemoteJob, RemoteJobEnd, WorkerRequest, WorkerResponse,
+    },
 };
 use std::{
     path::Path,
@@ -77,7 +79,7 @@ impl ServerClient {
     }
 
     /// Must the slot stop its job, because of a lost lease or the shutdown?
-    pub(super) fn has_ended(&self) -> bool {
+    pub(super) fn must_stop_job(&self) -> bool {
         self.current_job().is_lost || self.link.shutdown.is_cancelled()
     }
 
@@ -93,7 +95,9 @@ impl ServerClient {
 
     async fn store_file(&self, name: &str, file: &Path) -> anyhow::Result<()> {
         let (files, transfer) = (self.files(), &self.link.file_transfer);
-        files.store(transfer, name, file, || self.has_ended()).await
+        files
+            .store(transfer, name, file, || self.must_stop_job())
+            .await
     }
 
     /// Waits for [`RETRY_INTERVAL`], or until the shutdown.
@@ -163,7 +167,7 @@ impl JobServer for ServerClient {
         let request = WorkerRequest::RenewLease {
             lease: lease.clone(),
             episodes_done,
-            trouble: self.current_job().send_problem.clone(),
+            send_problem: self.current_job().send_problem.clone(),
         };
         let response = self.link.runtime.block_on(self.link.request(&request));
         match response {
@@ -175,7 +179,7 @@ impl JobServer for ServerClient {
                 self.current_job().is_lost = true;
                 Ok(LeaseStatus::Lost)
             }
-            Ok(WorkerResponse::Unknown) | Err(_) => {
+            Ok(WorkerResponse::Unavailable) | Err(_) => {
                 let confirmed_at = self.current_job().confirmed_at;
                 let timeout = Duration::from_secs(lease.duration_s.into());
                 if confirmed_at.is_some_and(|at| at.elapsed() > timeout) {
@@ -209,7 +213,7 @@ impl JobServer for ServerClient {
         let (report, files) = (Box::new(report), self.files());
         let episodes_done = report.episodes();
         let status = self.link.runtime.block_on(async {
-            let sent = self.send_result(lease, &files.grant, JobEnd::Done { report });
+            let sent = self.send_result(lease, &files.grant, RemoteJobEnd::Done { report });
             let Some(sequence) = sent.await? else {
                 return anyhow::Ok(LeaseStatus::Lost);
             };
@@ -231,16 +235,16 @@ impl JobServer for ServerClient {
 
     fn release(&self, lease: &Lease, reason: ReleaseReason<'_>) -> anyhow::Result<()> {
         let end = match reason {
-            ReleaseReason::Interrupted => JobEnd::Interrupted,
+            ReleaseReason::Interrupted => RemoteJobEnd::Interrupted,
             ReleaseReason::FullDisk => {
                 let mut disk_full_at = self
                     .disk_full_at
                     .lock()
                     .unwrap_or_else(PoisonError::into_inner);
                 *disk_full_at = Some(Instant::now());
-                JobEnd::FullDisk
+                RemoteJobEnd::FullDisk
             }
-            ReleaseReason::PlatformFault(summary) => JobEnd::PlatformFault {
+            ReleaseReason::PlatformFault(summary) => RemoteJobEnd::PlatformFault {
                 reason: summary.to_owned(),
             },
         };
@@ -278,7 +282,7 @@ impl JobServer for ServerClient {
 impl FileStore for ServerClient {
     fn fetch_bundle(&self, bundle: &BundleRef, archive: &Path) -> anyhow::Result<()> {
         let (files, transfer) = (self.files(), &self.link.file_transfer);
-        let fetched = files.fetch_bundle(transfer, bundle, archive, || self.has_ended());
+        let fetched = files.fetch_bundle(transfer, bundle, archive, || self.must_stop_job());
         self.link.runtime.block_on(fetched)
     }
 

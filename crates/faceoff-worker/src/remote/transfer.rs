@@ -21,9 +21,9 @@ pub(super) struct FileTransfer {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TransferTimeouts {
     /// An attempt is stopped after this time without progress.
-    pub(super) stall: Duration,
+    pub(super) stall_timeout: Duration,
     /// Retries end this long after the last progress. The server may be restarting meanwhile.
-    pub(super) unavailable: Duration,
+    pub(super) retry_timeout: Duration,
     /// Maximum number of attempts interrupted after some progress. More are a sign that a proxy refuses files of this size.
     pub(super) max_interrupted: u32,
     /// Delay before a retry.
@@ -35,8 +35,8 @@ pub(super) struct TransferTimeouts {
 impl Default for TransferTimeouts {
     fn default() -> Self {
         Self {
-            stall: Duration::from_secs(60),
-            unavailable: Duration::from_secs(60),
+            stall_timeout: Duration::from_secs(60),
+            retry_timeout: Duration::from_secs(60),
             max_interrupted: 10,
             retry_delay: Duration::from_secs(2),
             max_retry_delay: Duration::from_secs(30),
@@ -154,7 +154,7 @@ impl FileTransfer {
                 biased;
                 done = attempt(&self.http, &progress) => done,
                 () = &mut job_end => return Err(JobEnded.into()),
-                () = progress.wait_for_stall(timeouts.stall) => Err(TransientError::Stalled(timeouts.stall).into()),
+                () = progress.wait_for_stall(timeouts.stall_timeout) => Err(TransientError::Stalled(timeouts.stall_timeout).into()),
             };
             let Err(error) = result else {
                 return Ok(());
@@ -213,7 +213,7 @@ impl Attempts {
         }
         let is_expired = self
             .unavailable_since
-            .is_some_and(|since| since.elapsed() >= timeouts.unavailable);
+            .is_some_and(|since| since.elapsed() >= timeouts.retry_timeout);
         if (is_expired && self.failed > 1) || self.interrupted >= timeouts.max_interrupted {
             return None;
         }

@@ -13,7 +13,7 @@ use crate::{
     evaluator::Runner,
     scratch::Scratch,
     server::JobServer,
-    service::{Intervals, SlotServer, SlotsConfig, run_slots},
+    service::{Intervals, SlotSetup, SlotsConfig, run_slots},
 };
 use anyhow::Context as _;
 use faceoff_types::WorkerName;
@@ -27,15 +27,15 @@ use tokio_util::sync::CancellationToken;
 
 /// Configuration of a remote worker.
 #[derive(Debug, Clone)]
-pub struct RemoteWorker {
+pub struct RemoteWorkerConfig {
     pub nats: NatsConfig,
     /// Name of the worker, unique among the server's workers.
     pub name: String,
     pub capabilities: WorkerCapabilities,
     /// HTTP client for files. It has no timeout of its own, since transfers are monitored for progress.
     pub http: reqwest::Client,
-    /// Idle time after which the worker ends; `None`: never.
-    pub ends_after: Option<Duration>,
+    /// Idle time after which the worker exits; `None`: never.
+    pub exit_after_idle: Option<Duration>,
     pub slots: SlotsConfig,
 }
 
@@ -49,7 +49,7 @@ const IDLE_CHECK_INTERVAL: Duration = Duration::from_secs(1);
 /// If a name is invalid, the scratch folder cannot be locked, or a slot dies.
 #[boxed]
 pub async fn run_remote_worker(
-    config: RemoteWorker,
+    config: RemoteWorkerConfig,
     shutdown: CancellationToken,
 ) -> anyhow::Result<()> {
     let names = Names::new(&config.nats.name)?;
@@ -80,33 +80,33 @@ pub async fn run_remote_worker(
         busy_at: Mutex::new(Instant::now()),
         registered_at: Mutex::default(),
     });
-    if let Some(ends_after) = config.ends_after {
+    if let Some(exit_after_idle) = config.exit_after_idle {
         let (link, shutdown) = (Arc::clone(&link), shutdown.clone());
         tokio::spawn(async move {
-            while link.idle_for() < ends_after {
-                tokio::time::sleep(IDLE_CHECK_INTERVAL.min(ends_after)).await;
+            while link.idle_for() < exit_after_idle {
+                tokio::time::sleep(IDLE_CHECK_INTERVAL.min(exit_after_idle)).await;
             }
-            tracing::info!(?ends_after, "ending: idle");
+            tracing::info!(ends_after = ?exit_after_idle, "ending: idle");
             shutdown.cancel();
         });
     }
-    let servers = (0..config.slots.cpus.slots.len()).map(|index| {
+    let slot_setups = (0..config.slots.cpus.slots.len()).map(|index| {
         let client = Arc::new(ServerClient::new(Arc::clone(&link)));
-        SlotServer {
+        SlotSetup {
             slot: format!("slot-{index}"),
             server: Arc::clone(&client) as Arc<dyn JobServer>,
             files: client,
             scorer: None,
         }
     });
-    let servers = servers.collect();
+    let slot_setups = slot_setups.collect();
     let evaluator = Arc::new(Runner {
         simulator: config.slots.agent.simulator.clone(),
     });
     let running = run_slots(
         config.slots,
         &scratch,
-        servers,
+        slot_setups,
         evaluator,
         Intervals::default(),
         shutdown,

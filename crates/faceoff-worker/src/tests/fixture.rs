@@ -56,7 +56,7 @@ pub(super) type PlayGame =
     dyn Fn(&GameSpec, &mut dyn LiveFeedSink) -> Result<(), PlatformFault> + Send + Sync;
 
 /// An evaluator that plays by a test's closures, and records the played shards and assembled parts.
-pub(super) struct Scripted {
+pub(super) struct ScriptedEvaluator {
     play_shard: Box<PlayShard>,
     play_game: Box<PlayGame>,
     /// Task and first episode of each shard that was played.
@@ -67,7 +67,7 @@ pub(super) struct Scripted {
     pub(super) endless_unpacking: tokio::sync::Notify,
 }
 
-impl Scripted {
+impl ScriptedEvaluator {
     /// Plays shards by the closure, and everything else without faults.
     pub(super) fn new(
         play_shard: impl Fn(&ShardSpec, &mut dyn Observer) -> Result<(), PlatformFault>
@@ -148,7 +148,7 @@ fn clips(spec: &ShardSpec) -> Vec<u8> {
     pack.finish().unwrap()
 }
 
-impl Evaluator for Scripted {
+impl Evaluator for ScriptedEvaluator {
     fn unpack(
         &self,
         archive: &Path,
@@ -400,7 +400,11 @@ impl Server {
             .local_server(self.store.clone(), self.live.clone(), self.clock())
     }
 
-    pub(super) fn start_slots(&self, slots: usize, evaluator: &Arc<Scripted>) -> RunningSlots {
+    pub(super) fn start_slots(
+        &self,
+        slots: usize,
+        evaluator: &Arc<ScriptedEvaluator>,
+    ) -> RunningSlots {
         self.start_intercepted_slots(slots, evaluator, |server| Arc::new(server))
     }
 
@@ -408,7 +412,7 @@ impl Server {
     pub(super) fn start_intercepted_slots(
         &self,
         slots: usize,
-        evaluator: &Arc<Scripted>,
+        evaluator: &Arc<ScriptedEvaluator>,
         intercept: impl FnOnce(LocalServer) -> Arc<dyn JobServer>,
     ) -> RunningSlots {
         let config = self.config(slots);
@@ -483,7 +487,7 @@ pub(super) fn limits() -> Limits {
         open_files: 64,
         file_size_bytes: 1 << 20,
         cpus: 1.0,
-        stderr_tail_bytes: 1 << 16,
+        stderr_kept_bytes: 1 << 16,
     }
 }
 

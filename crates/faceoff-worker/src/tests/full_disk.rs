@@ -20,7 +20,7 @@ async fn full_disk_does_not_count_as_an_attempt() {
     let server = Server::new().await;
     let id = server.start_evaluation().await;
     let (calls, clock_ahead_s) = (AtomicU32::new(0), Arc::clone(&server.clock_ahead_s));
-    let evaluator = Scripted::new(move |spec, _| {
+    let evaluator = ScriptedEvaluator::new(move |spec, _| {
         assert_eq!(spec.platform_retries, 0, "no attempt was counted");
         // Skips the pause after each failure.
         clock_ahead_s.fetch_add(10, Ordering::SeqCst);
@@ -39,10 +39,10 @@ async fn full_disk_does_not_count_as_an_attempt() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn commit_waits_for_disk_space_without_replaying() {
+async fn commit_waits_for_disk_space_without_running_the_job_again() {
     let server = Server::new().await;
     let id = server.start_evaluation().await;
-    let evaluator = Scripted::new(|_, _| Ok(()));
+    let evaluator = ScriptedEvaluator::new(|_, _| Ok(()));
     let failures = AtomicU32::new(0);
     let running = server.start_intercepted_slots(1, &evaluator, |local| {
         InterceptedServer::shared(local, move |interception| match interception {
@@ -63,7 +63,7 @@ async fn release_waits_for_disk_space() {
     let server = Server::new().await;
     let id = server.start_evaluation().await;
     let (calls, clock_ahead_s) = (AtomicU32::new(0), Arc::clone(&server.clock_ahead_s));
-    let evaluator = Scripted::new(move |spec, _| {
+    let evaluator = ScriptedEvaluator::new(move |spec, _| {
         clock_ahead_s.fetch_add(10, Ordering::SeqCst);
         assert_eq!(spec.platform_retries, 0, "the lease did not expire");
         match calls.fetch_add(1, Ordering::SeqCst) {

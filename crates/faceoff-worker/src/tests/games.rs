@@ -145,7 +145,7 @@ async fn platform_fault_ends_game_without_result_until_rerun() {
     let seeds = Arc::new(Mutex::new(BTreeSet::new()));
     let failing_evaluator = {
         let seeds = Arc::clone(&seeds);
-        Scripted::with_game(move |spec, _| {
+        ScriptedEvaluator::with_game(move |spec, _| {
             seeds.lock().unwrap().insert(spec.seed.to_string());
             Err(PlatformFault::Recording("a bug of the platform".into()))
         })
@@ -177,7 +177,7 @@ async fn platform_fault_ends_game_without_result_until_rerun() {
     rerun.await.unwrap();
     let healthy_evaluator = {
         let seeds = Arc::clone(&seeds);
-        Scripted::with_game(move |spec, _| {
+        ScriptedEvaluator::with_game(move |spec, _| {
             seeds.lock().unwrap().insert(spec.seed.to_string());
             Ok(())
         })
@@ -214,7 +214,7 @@ async fn only_the_recording_of_the_last_result_is_kept() {
     // The recording of an attempt that was killed between upload and commit.
     let killed = format!("games/{game}/killed/game.zip");
     server.put_artifact(&killed, b"PK").await;
-    let evaluator = Scripted::with_game(|_, _| Ok(()));
+    let evaluator = ScriptedEvaluator::with_game(|_, _| Ok(()));
     let running = server.start_slots(1, &evaluator);
     let files = |result: &GameResultRow| {
         let recording = result.recording.as_ref().expect("a round's game has one");
@@ -260,7 +260,7 @@ async fn lost_lease_discards_result_and_recording() {
     };
     // The lease expires, and another slot plays the game.
     server.advance(2 * i64::from(LEASE_S));
-    let evaluator = Scripted::with_game(|_, _| Ok(()));
+    let evaluator = ScriptedEvaluator::with_game(|_, _| Ok(()));
     let running = server.start_slots(1, &evaluator);
     let result = wait_for_result(&server, game).await;
     running.stop().await;
@@ -300,16 +300,17 @@ async fn lost_commit_response_keeps_result_and_recording() {
         .await
         .id;
     let commits = Arc::new(AtomicU32::new(0));
-    let running = server.start_intercepted_slots(1, &Scripted::with_game(|_, _| Ok(())), |local| {
-        let commits = Arc::clone(&commits);
-        InterceptedServer::shared(local, move |interception| match interception {
-            Interception::Committed(_) => {
-                commits.fetch_add(1, Ordering::SeqCst);
-                anyhow::bail!("the connection broke")
-            }
-            Interception::Releasing => Ok(()),
-        })
-    });
+    let running =
+        server.start_intercepted_slots(1, &ScriptedEvaluator::with_game(|_, _| Ok(())), |local| {
+            let commits = Arc::clone(&commits);
+            InterceptedServer::shared(local, move |interception| match interception {
+                Interception::Committed(_) => {
+                    commits.fetch_add(1, Ordering::SeqCst);
+                    anyhow::bail!("the connection broke")
+                }
+                Interception::Releasing => Ok(()),
+            })
+        });
     let result = wait_for_result(&server, game).await;
     running.stop().await;
     assert_eq!(commits.load(Ordering::SeqCst), 1);
@@ -338,7 +339,7 @@ async fn live_updates_cover_each_attempt() {
     let (published, end_permits) = (event.clone(), Arc::new(tokio::sync::Semaphore::new(0)));
     let (started, mut starts) = tokio::sync::mpsc::unbounded_channel();
     let evaluator_permits = Arc::clone(&end_permits);
-    let evaluator = Scripted::with_game(move |_, live_updates| {
+    let evaluator = ScriptedEvaluator::with_game(move |_, live_updates| {
         live_updates.receive(vec![published.clone()], POSITION);
         started.send(()).unwrap();
         while evaluator_permits

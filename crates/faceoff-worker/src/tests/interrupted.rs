@@ -18,9 +18,9 @@ use std::{
 use tokio::sync::mpsc::UnboundedReceiver;
 
 /// An evaluator whose shards run until they are cancelled; the channel reports their starts.
-fn hanging_evaluator() -> (Arc<Scripted>, UnboundedReceiver<(Task, u32)>) {
+fn hanging_evaluator() -> (Arc<ScriptedEvaluator>, UnboundedReceiver<(Task, u32)>) {
     let (started, starts) = tokio::sync::mpsc::unbounded_channel();
-    let hanging = Scripted::new(move |spec, observer| {
+    let hanging = ScriptedEvaluator::new(move |spec, observer| {
         started.send((spec.task, spec.episodes.start)).unwrap();
         while !observer.cancelled() {
             std::thread::yield_now();
@@ -41,7 +41,7 @@ async fn shutdown_releases_jobs_for_the_next_worker() {
     running.stop().await;
     assert!(hanging.played.lock().unwrap().is_empty());
 
-    let healthy = Scripted::new(|_, _| Ok(()));
+    let healthy = ScriptedEvaluator::new(|_, _| Ok(()));
     let running = server.start_slots(1, &healthy);
     server.wait_for_result(id).await;
     assert_eq!(healthy.played.lock().unwrap().len(), 6);
@@ -85,7 +85,7 @@ async fn shutdown_releases_job_before_the_slot_ends() {
 async fn shutdown_interrupts_unpacking() {
     let server = Server::new().await;
     let submission = server.upload("Alpha", ENDLESS_ARCHIVE).await;
-    let evaluator = Scripted::new(|_, _| Ok(()));
+    let evaluator = ScriptedEvaluator::new(|_, _| Ok(()));
     let running = server.start_slots(1, &evaluator);
     evaluator.endless_unpacking.notified().await;
     running.stop().await;
@@ -107,7 +107,7 @@ async fn cancelled_evaluation_stops_its_slots() {
     let id = server.start_evaluation().await;
     let (started, mut starts) = tokio::sync::mpsc::unbounded_channel();
     let (stopped, mut stops) = tokio::sync::mpsc::unbounded_channel();
-    let hanging = Scripted::new(move |spec, observer| {
+    let hanging = ScriptedEvaluator::new(move |spec, observer| {
         // Progress triggers a renewal within a second.
         observer.on_episode_end(&outcome(spec.task, spec.episodes.start));
         started.send(()).unwrap();
@@ -140,7 +140,7 @@ async fn result_of_a_lost_lease_is_discarded() {
     let (store, clock_ahead_s) = (server.store.clone(), Arc::clone(&server.clock_ahead_s));
     let second_claim = Arc::new(Mutex::new(None));
     let shared_claim = Arc::clone(&second_claim);
-    let evaluator = Scripted::new(move |spec, _| {
+    let evaluator = ScriptedEvaluator::new(move |spec, _| {
         if shared_claim.lock().unwrap().is_none() {
             // The slot stalls until its lease has expired, and another worker claims the shard.
             clock_ahead_s.fetch_add(i64::from(LEASE_S) + 1, Ordering::SeqCst);
@@ -231,7 +231,7 @@ async fn restarted_worker_releases_its_former_leases() {
         .unwrap()
         .unwrap();
     drop(scratch);
-    let running = server.start_slots(1, &Scripted::new(|_, _| Ok(())));
+    let running = server.start_slots(1, &ScriptedEvaluator::new(|_, _| Ok(())));
     server.wait_for_result(id).await;
     running.stop().await;
 }
@@ -241,7 +241,7 @@ async fn scratch_folder_cannot_be_shared() {
     let server = Server::new().await;
     let _first_process =
         crate::scratch::Scratch::take(&server.folder.path().join("scratch")).unwrap();
-    let running = server.start_slots(1, &Scripted::new(|_, _| Ok(())));
+    let running = server.start_slots(1, &ScriptedEvaluator::new(|_, _| Ok(())));
     let error = running.task.await.unwrap().unwrap_err();
     assert!(error.to_string().contains("another process"), "{error}");
 }

@@ -162,7 +162,7 @@ async fn jobs_and_ablations_use_the_stages_variation() {
                 assert_eq!(spec.perturbations, changed_variation.perturbations);
                 changed_jobs += 1;
             }
-            JobPayload::Scoring { meta, .. } => assert!(meta.variation.is_none()),
+            JobPayload::Scoring { meta, .. } => assert!(meta.variation.is_empty()),
             _ => {}
         }
         complete_and_commit(&server, &job).await;
@@ -280,7 +280,7 @@ async fn dataset_of_a_lost_lease_is_removed() {
 async fn lost_commit_response_keeps_the_dataset() {
     let server = Server::new().await;
     let id = server.start_evaluation().await;
-    let evaluator = Scripted::new(|_, _| Ok(()));
+    let evaluator = ScriptedEvaluator::new(|_, _| Ok(()));
     let running = server.start_intercepted_slots(2, &evaluator, |local| {
         InterceptedServer::shared(local, |interception| match interception {
             Interception::Committed(JobReport::Scoring { .. }) => {

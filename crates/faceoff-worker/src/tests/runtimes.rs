@@ -18,7 +18,7 @@ async fn unaccepted_runtime_is_refused_before_the_agent_runs() {
         accept_runtimes(&server.store, stage, runtimes, server.now()).await;
     };
     set_runtimes(Some(&["python3"])).await;
-    let evaluator = Scripted::new(|_, _| Ok(()));
+    let evaluator = ScriptedEvaluator::new(|_, _| Ok(()));
     let running = server.start_slots(1, &evaluator);
     let refused = server.upload("Alpha", VALID_ARCHIVE).await;
     let refused = wait_for_validation(&server.store, refused.id).await;

@@ -1,11 +1,11 @@
-use crate::schedule::start_unless_behind;
+use crate::schedule::update_due_days_unless_behind;
 use faceoff_testkit::{configure_stage, new_store, one_shard_plan};
 use faceoff_types::{Clock, ClockStart, Schedule};
 use jiff::{SignedDuration, Timestamp};
 use std::sync::{Arc, Mutex};
 
 #[tokio::test]
-async fn no_day_starts_before_the_newest_change() {
+async fn no_day_starts_while_the_clock_is_behind_the_database() {
     let folder = tempfile::tempdir().unwrap();
     let store = new_store(folder.path()).await;
     let first: Timestamp = "2026-03-01T00:00:00Z".parse().unwrap();
@@ -27,12 +27,12 @@ async fn no_day_starts_before_the_newest_change() {
     });
     let competition = faceoff_airhockey::competition();
     let days = async |clock: &Clock| {
-        let started = start_unless_behind(&store, &competition, clock, clock.now()).await;
+        let started = update_due_days_unless_behind(&store, &competition, clock, clock.now()).await;
         started.unwrap();
         store.days().await.unwrap().len()
     };
     assert_eq!(days(&behind).await, 0);
-    let has_caught_up = |now: &mut Timestamp| *now += SignedDuration::from_hours(2);
-    has_caught_up(&mut now.lock().unwrap());
+    let advance_two_hours = |now: &mut Timestamp| *now += SignedDuration::from_hours(2);
+    advance_two_hours(&mut now.lock().unwrap());
     assert_eq!(days(&behind).await, 1);
 }

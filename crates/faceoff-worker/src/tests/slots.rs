@@ -26,7 +26,7 @@ use tokio_util::sync::CancellationToken;
 async fn slots_play_each_shard_once_and_store_the_dataset() {
     let server = Server::new().await;
     let id = server.start_evaluation().await;
-    let evaluator = Scripted::new(|spec, observer| {
+    let evaluator = ScriptedEvaluator::new(|spec, observer| {
         for episode in spec.episodes.clone() {
             observer.on_episode_end(&outcome(spec.task, episode));
         }
@@ -88,7 +88,7 @@ async fn checked_state(
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn idle_slot_validates_submissions() {
     let server = Server::new().await;
-    let running = server.start_slots(1, &Scripted::new(|_, _| Ok(())));
+    let running = server.start_slots(1, &ScriptedEvaluator::new(|_, _| Ok(())));
     let mut events = server.store.events();
     let valid_id = server.upload("Alpha", VALID_ARCHIVE).await.id;
     let invalid_id = server.upload("Beta", INVALID_ARCHIVE).await.id;
@@ -112,7 +112,7 @@ async fn panics_and_platform_faults_are_retried() {
     let server = Server::new().await;
     let id = server.start_evaluation().await;
     let (calls, clock_ahead_s) = (AtomicU32::new(0), Arc::clone(&server.clock_ahead_s));
-    let evaluator = Scripted::new(move |_, _| {
+    let evaluator = ScriptedEvaluator::new(move |_, _| {
         match calls.fetch_add(1, Ordering::SeqCst) {
             0 => panic!("a bug of the platform"),
             1 => {
@@ -147,7 +147,7 @@ async fn error_after_a_cancellation_is_no_platform_fault() {
     let (handle, clock) = (tokio::runtime::Handle::current(), server.clock());
     let store = server.store.clone();
     // Ends before the lease keeper has noticed that the lease is lost.
-    let evaluator = Scripted::new(move |_, _| {
+    let evaluator = ScriptedEvaluator::new(move |_, _| {
         let cancelled = store.cancel_evaluation(Actor::Operator, id, "a test", clock.now());
         handle.block_on(cancelled).unwrap();
         Err(PlatformFault::Io {
@@ -182,7 +182,7 @@ async fn failed_slot_pauses_and_stops_at_shutdown() {
         Arc::clone(&server.clock_ahead_s),
     );
     let thread_names = Arc::clone(&started);
-    let evaluator = Scripted::new(move |_, _| {
+    let evaluator = ScriptedEvaluator::new(move |_, _| {
         // Skips the pause of the job, but not that of the slot.
         clock_ahead_s.fetch_add(10, Ordering::SeqCst);
         let mut thread_names = thread_names.lock().unwrap();
@@ -207,7 +207,7 @@ async fn lasting_platform_fault_fails_and_requeues_evaluation() {
     let server = Server::new().await;
     let id = server.start_evaluation().await;
     let clock_ahead_s = Arc::clone(&server.clock_ahead_s);
-    let evaluator = Scripted::new(move |_, _| {
+    let evaluator = ScriptedEvaluator::new(move |_, _| {
         // Skips the pause of the job after a failure.
         clock_ahead_s.fetch_add(61, Ordering::SeqCst);
         Err(PlatformFault::Recording("no space left".into()))
@@ -363,7 +363,7 @@ async fn ablation_plays_own_episodes_in_all_profiles() {
         .submission;
     let specs = Arc::new(Mutex::new(Vec::new()));
     let recorded_specs = Arc::clone(&specs);
-    let evaluator = Scripted::new(move |spec, _| {
+    let evaluator = ScriptedEvaluator::new(move |spec, _| {
         recorded_specs.lock().unwrap().push(spec.clone());
         Ok(())
     });

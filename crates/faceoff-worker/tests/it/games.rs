@@ -132,14 +132,14 @@ async fn hostile_agents_lose_without_harming_the_opponent() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn late_answers_are_no_fault_and_harmless() {
+async fn late_answers_are_no_fault_and_do_not_affect_the_opponent() {
     let server = Server::new().await;
     let punctual = server.upload_valid("Punctual", "").await;
     let late = server
         .upload_valid("Late", "MISCHIEF = \"slow\"\nSWING = \"0.5\"")
         .await;
     let mut rules = rules(30);
-    rules.game_limits.in_time_s = 0.02;
+    rules.game_limits.max_answer_s = 0.02;
     let games = start_round(&server, rules, &[[late, punctual]]).await;
     let worker = server.start_worker(1);
     let results = wait_for_results(&server, games[0].tournament).await;

@@ -12,7 +12,7 @@ pub fn rules(steps: u32) -> TournamentRules {
     TournamentRules {
         steps,
         game_limits: GameLimits {
-            in_time_s: 1.0,
+            max_answer_s: 1.0,
             restart_s: 600.0,
             ..GameLimits::default()
         },

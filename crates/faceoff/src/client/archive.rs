@@ -23,7 +23,7 @@ impl Client {
     /// # Errors
     /// If the file exists, the server cannot be reached or refuses, or the download is incomplete. A failed download leaves no
     /// file.
-    pub async fn season_archive(
+    pub async fn download_season_archive(
         &self,
         edition: Edition,
         file: &Path,

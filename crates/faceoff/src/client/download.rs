@@ -30,7 +30,7 @@ pub struct DownloadedFile {
 }
 
 impl Client {
-    /// Downloads `path` to `file`. `published` is the expected hash, if the caller knows it from elsewhere than the
+    /// Downloads `path` to `file`. `expected_blake3` is the expected hash, if the caller knows it from elsewhere than the
     /// response.
     ///
     /// Received bytes go to `FILE.part`, which stays if the connection breaks; `FILE.part.etag` has the ETag of its
@@ -39,7 +39,7 @@ impl Client {
         &self,
         path: &str,
         file: &Path,
-        published: Option<&str>,
+        expected_blake3: Option<&str>,
         bar: &ProgressBar,
     ) -> anyhow::Result<DownloadedFile> {
         let mut part = PartialFile::open(file)?;
@@ -88,7 +88,7 @@ impl Client {
                 None => anyhow!(super::Unreachable(message)),
             });
         }
-        let expected = published.map(str::to_owned).or(info.hash);
+        let expected = expected_blake3.map(str::to_owned).or(info.hash);
         let (blake3, checked) = tokio::task::spawn_blocking(move || {
             part.finish(expected.as_deref())
                 .map(|hash| (hash, expected.is_some()))

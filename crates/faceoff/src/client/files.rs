@@ -11,30 +11,30 @@ use reqwest::Method;
 use std::path::Path;
 
 impl Client {
-    /// Downloads a dataset to `file`: for its team and organisers, or for everyone if it is public. `published` is
+    /// Downloads a dataset to `file`: for its team and organisers, or for everyone if it is public. `expected_blake3` is
     /// the hash that the evaluation names.
     pub async fn download_dataset(
         &self,
         id: EvaluationId,
         file: &Path,
-        published: Option<&str>,
+        expected_blake3: Option<&str>,
         bar: &ProgressBar,
     ) -> anyhow::Result<DownloadedFile> {
         let path = format!("/evaluations/{id}/dataset");
-        self.download(&path, file, published, bar).await
+        self.download(&path, file, expected_blake3, bar).await
     }
 
-    /// Team or organiser: downloads the bundle of a submission to `file`. `published` is the hash that the submission
+    /// Team or organiser: downloads the bundle of a submission to `file`. `expected_blake3` is the hash that the submission
     /// names.
     pub async fn download_submission(
         &self,
         id: SubmissionId,
         file: &Path,
-        published: &str,
+        expected_blake3: &str,
         bar: &ProgressBar,
     ) -> anyhow::Result<DownloadedFile> {
         let path = format!("/submissions/{id}/bundle");
-        self.download(&path, file, Some(published), bar).await
+        self.download(&path, file, Some(expected_blake3), bar).await
     }
 
     /// Team or organiser: deletes the bundle of a submission.

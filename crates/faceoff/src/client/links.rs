@@ -19,7 +19,7 @@ pub enum LinkTarget {
 impl Client {
     /// Creates a link; only this response contains it. A server without a public address sends a relative URL, which
     /// is made absolute here.
-    pub async fn link(&self, target: LinkTarget, new: NewLink) -> anyhow::Result<LinkView> {
+    pub async fn create_link(&self, target: LinkTarget, new: NewLink) -> anyhow::Result<LinkView> {
         let path = match target {
             LinkTarget::Dataset(id) => format!("/evaluations/{id}/dataset/link"),
             LinkTarget::Submission(id) => format!("/submissions/{id}/bundle/link"),

@@ -21,7 +21,7 @@ impl Client {
     }
 
     /// Organiser: starts a trial of the active submissions.
-    pub async fn trial(&self, stage: StageId, trial: &Trial) -> anyhow::Result<ProposalView> {
+    pub async fn start_trial(&self, stage: StageId, trial: &Trial) -> anyhow::Result<ProposalView> {
         self.post(&format!("/stages/{stage}/trial"), trial).await
     }
 

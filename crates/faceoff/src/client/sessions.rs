@@ -13,7 +13,7 @@ impl Client {
     ///
     /// # Errors
     /// If name or password is wrong, or the user may not create tokens.
-    pub async fn token_by_password(
+    pub async fn create_token_with_password(
         &self,
         name: &str,
         password: &str,

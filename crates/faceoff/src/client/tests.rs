@@ -304,7 +304,7 @@ async fn stage_change_keeps_the_fields_it_leaves_out() {
             ))),
             day_deadline: Some(DayDeadline::Hours(30)),
             blind: Some(true),
-            standings: Some(CountingResult::MeanOfLast(3)),
+            counting_result: Some(CountingResult::MeanOfLast(3)),
             retention: serde_json::from_str(r#"{"last":3}"#).unwrap(),
             ..StagePatch::default()
         },
@@ -335,7 +335,7 @@ async fn stage_change_keeps_the_fields_it_leaves_out() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn temporary_failures_are_repeated_for_a_while() {
+async fn request_is_retried_while_its_failures_are_temporary() {
     use std::sync::atomic::{AtomicU32, Ordering};
     let refused = |status: StatusCode| ApiError {
         status,
@@ -343,10 +343,10 @@ async fn temporary_failures_are_repeated_for_a_while() {
         title: String::new(),
         detail: String::new(),
     };
-    let patience = Duration::from_mins(5);
+    let retry_timeout = Duration::from_mins(5);
     let requests = AtomicU32::new(0);
     // A restart: the server is gone, then not ready, then there.
-    let answer = retry_temporary(patience, async || {
+    let answer = retry_temporary(retry_timeout, async || {
         match requests.fetch_add(1, Ordering::Relaxed) {
             0 | 1 => Err(Unreachable("gone".to_owned()).into()),
             2 => Err(refused(StatusCode::SERVICE_UNAVAILABLE).into()),
@@ -358,12 +358,12 @@ async fn temporary_failures_are_repeated_for_a_while() {
     assert_eq!(requests.load(Ordering::Relaxed), 5);
     let started = Instant::now();
     let gone = async || -> anyhow::Result<()> { Err(Unreachable("gone".to_owned()).into()) };
-    let given_up = retry_temporary(patience, gone).await.unwrap_err();
-    assert!(given_up.is::<Unreachable>() && started.elapsed() >= patience);
+    let given_up = retry_temporary(retry_timeout, gone).await.unwrap_err();
+    assert!(given_up.is::<Unreachable>() && started.elapsed() >= retry_timeout);
     // A refusal stays one.
     let started = Instant::now();
     let forbidden = async || -> anyhow::Result<()> { Err(refused(StatusCode::FORBIDDEN).into()) };
-    let final_error = retry_temporary(patience, forbidden).await.unwrap_err();
+    let final_error = retry_temporary(retry_timeout, forbidden).await.unwrap_err();
     assert!(is_refused_with(&final_error, StatusCode::FORBIDDEN));
     assert_eq!(started.elapsed(), Duration::ZERO);
 }

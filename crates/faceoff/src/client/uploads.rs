@@ -27,8 +27,8 @@ use tokio::{io::AsyncSeekExt, time::Instant};
 use tokio_util::io::ReaderStream;
 use uuid::Uuid;
 
-/// Time for which attempts without any progress are repeated.
-const PATIENCE: Duration = Duration::from_mins(5);
+/// Time for which attempts without any progress are repeated after temporary failures.
+const RETRY_TIMEOUT: Duration = Duration::from_mins(5);
 
 /// Longest time without a byte sent or an answer received; then the connection is given up.
 const STALL_TIMEOUT: Duration = Duration::from_secs(60);
@@ -54,13 +54,13 @@ impl PartialUpload<'_> {
     /// Sends what the server does not have yet.
     async fn send(&self) -> anyhow::Result<()> {
         let mut farthest = 0;
-        let mut give_up_at = Instant::now() + PATIENCE;
+        let mut give_up_at = Instant::now() + RETRY_TIMEOUT;
         loop {
             let error = match self.send_rest(&mut farthest, &mut give_up_at).await {
                 Ok(()) => return Ok(()),
                 Err(error) => error,
             };
-            // The server has got less or more than this attempt knew.
+            // After a conflict, the server has received fewer or more bytes than this attempt assumed.
             if !(is_interruption(&error) || is_conflict(&error)) || Instant::now() >= give_up_at {
                 return Err(error);
             }
@@ -68,8 +68,8 @@ impl PartialUpload<'_> {
         }
     }
 
-    /// Sends one part, from the first byte that the server does not have to the end. If the server has got farther since the last
-    /// attempt, the patience starts again.
+    /// Sends one part, from the first byte that the server does not have to the end. If the server has received more since
+    /// the last attempt, the time for retries starts again.
     async fn send_rest(&self, farthest: &mut u64, give_up_at: &mut Instant) -> anyhow::Result<()> {
         let offset = match self.client.get::<PartialUploadView>(&self.path).await {
             Ok(upload) => upload.received_bytes,
@@ -78,7 +78,7 @@ impl PartialUpload<'_> {
         };
         if offset > *farthest {
             *farthest = offset;
-            *give_up_at = Instant::now() + PATIENCE;
+            *give_up_at = Instant::now() + RETRY_TIMEOUT;
         }
         self.progress.set_position(offset);
         let bytes = self.bundle.bytes();
@@ -118,7 +118,8 @@ impl PartialUpload<'_> {
     }
 }
 
-/// Whether the server has other parts than the request assumed. Other refusals with this status, such as the end of the season, last.
+/// Is this a conflict: does the server have other parts than the request assumed? Other refusals with the same status, such as the
+/// end of the season, are permanent.
 fn is_conflict(error: &anyhow::Error) -> bool {
     let refused = error.downcast_ref::<ApiError>();
     refused.is_some_and(|refused| refused.kind == "conflict")
@@ -165,7 +166,7 @@ impl Client {
         progress: &ProgressBar,
     ) -> anyhow::Result<SubmissionView> {
         let bytes = bundle.bytes();
-        let me = retry_while(is_interruption, PATIENCE, async || self.me().await).await?;
+        let me = retry_while(is_interruption, RETRY_TIMEOUT, async || self.me().await).await?;
         let limit = me.max_bundle_bytes;
         if bytes > limit {
             bail!(
@@ -193,7 +194,7 @@ impl Client {
         let key = Uuid::now_v7().to_string();
         let submit = async || {
             parts.send().await?;
-            retry_while(is_interruption, PATIENCE, async || {
+            retry_while(is_interruption, RETRY_TIMEOUT, async || {
                 let request = self
                     .request(Method::POST, "/submissions")
                     .query(&[("file_name", bundle.name()), ("upload", &hash.to_string())])
@@ -251,8 +252,8 @@ impl Client {
             .await
     }
 
-    /// Team: changes the description of a submission.
-    pub async fn describe(
+    /// Team: changes the label or the note of a submission.
+    pub async fn change_submission(
         &self,
         id: SubmissionId,
         change: &SubmissionChange,

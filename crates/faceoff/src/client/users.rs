@@ -3,9 +3,9 @@
 use super::{Client, read_json};
 use faceoff_api::{
     requests::{
-        Confirmation, Decision, JoinRequest, Made, NewAnnouncement, NewAnswer, NewInvitation,
-        NewPassword, NewQuestion, NewTeam, NewTerms, NewToken, Reason, RegistrationRequest,
-        RevocationQuery, SeasonChange, TeamChange, UserChange,
+        Confirmation, CreatedWithToken, Decision, JoinRequest, NewAnnouncement, NewAnswer,
+        NewInvitation, NewPassword, NewQuestion, NewTeam, NewTerms, NewToken, Reason,
+        RegistrationRequest, RevocationQuery, SeasonChange, TeamChange, UserChange,
     },
     views::{
         announcement::{AnnouncementView, QuestionView, TermsView},
@@ -40,11 +40,11 @@ impl Client {
         self.post_empty(&format!("/tokens/{id}/rotate")).await
     }
 
-    /// Revokes a token. `made` says what happens to all that was made with it.
+    /// Revokes a token. `made` says whether the tokens, invitations and webhooks that were created with it end, too.
     pub async fn revoke_token(
         &self,
         id: TokenId,
-        made: Option<Made>,
+        made: Option<CreatedWithToken>,
     ) -> anyhow::Result<RevokedTokenView> {
         let request = self.request(Method::DELETE, &format!("/tokens/{id}"));
         let request = request.query(&RevocationQuery { made });

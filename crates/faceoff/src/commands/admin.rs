@@ -125,10 +125,10 @@ impl AdminCommand {
     /// # Errors
     /// If there is no token, or the server cannot be reached or refuses.
     pub fn run(self) -> anyhow::Result<()> {
-        super::block_on(self.act())
+        super::block_on(self.run_action())
     }
 
-    async fn act(self) -> anyhow::Result<()> {
+    async fn run_action(self) -> anyhow::Result<()> {
         let client = authentication::admin_client(
             self.server.as_deref(),
             self.token.as_deref(),
@@ -137,21 +137,21 @@ impl AdminCommand {
         )?;
         let json = self.json;
         match self.action {
-            Action::Team(action) => teams::act(&client, json, action).await,
+            Action::Team(action) => teams::run_action(&client, json, action).await,
             Action::People { action } => people::people(&client, json, action).await,
             Action::Registration { action } => people::registrations(&client, json, action).await,
-            Action::Token { action } => token::act(&client, json, action).await,
-            Action::Webhook { action } => webhook::act(&client, json, action).await,
-            Action::Worker { action } => workers::act(&client, json, action).await,
-            Action::Announcement(action) => announcements::act(&client, json, action).await,
-            Action::Day(action) => day::act(&client, json, action).await,
-            Action::Storage(action) => storage::act(&client, json, action).await,
-            Action::Result(action) => results::act(&client, json, action).await,
-            Action::Proposal { action } => proposal::act(&client, json, action).await,
-            Action::Stage { action } => stage::act(&client, json, action).await,
-            Action::Tournament { action } => tournament::act(&client, json, *action).await,
-            Action::Evaluation(action) => evaluations::act(&client, json, action).await,
-            Action::Season(action) => season::act(&client, json, action).await,
+            Action::Token { action } => token::run_action(&client, json, action).await,
+            Action::Webhook { action } => webhook::run_action(&client, json, action).await,
+            Action::Worker { action } => workers::run_action(&client, json, action).await,
+            Action::Announcement(action) => announcements::run_action(&client, json, action).await,
+            Action::Day(action) => day::run_action(&client, json, action).await,
+            Action::Storage(action) => storage::run_action(&client, json, action).await,
+            Action::Result(action) => results::run_action(&client, json, action).await,
+            Action::Proposal { action } => proposal::run_action(&client, json, action).await,
+            Action::Stage { action } => stage::run_action(&client, json, action).await,
+            Action::Tournament { action } => tournament::run_action(&client, json, *action).await,
+            Action::Evaluation(action) => evaluations::run_action(&client, json, action).await,
+            Action::Season(action) => season::run_action(&client, json, action).await,
             Action::Log(args) => log::list(&client, json, args).await,
             Action::Evaluations { day } => evaluations::list(&client, json, day).await,
         }

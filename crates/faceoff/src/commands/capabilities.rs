@@ -19,7 +19,7 @@ pub fn own_capabilities(
         .and_then(|file| hasher.update_reader(file).map(drop))
         .with_context(|| format!("reading {}", program.display()))?;
     Ok(WorkerCapabilities {
-        program: hasher.finalize().to_string(),
+        program_blake3: hasher.finalize().to_string(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         runtimes: take_inventory(agent),
         slots: u32::try_from(slots).unwrap_or(u32::MAX),

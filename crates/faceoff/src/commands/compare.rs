@@ -189,7 +189,7 @@ impl Evaluation {
             summary: EpisodeSummary::from_outcomes(
                 competition(),
                 &outcomes,
-                &competition().played_tasks(episodes)?,
+                &competition().tasks_in_order(episodes)?,
                 competition().tier_bounds(&self.manifest.variation),
             )?,
             manifest: &self.manifest,

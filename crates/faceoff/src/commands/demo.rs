@@ -322,7 +322,7 @@ impl Server {
         let visitor = Client::new(&self.url, None, None)?;
         visitor.health().await?;
         let token = std::fs::read_to_string(self.data_dir.join("admin-token"))
-            .context("reading the organiser's token")?;
+            .context("reading the operator's token")?;
         Ok(visitor.with_token(token.trim()))
     }
 

@@ -1,7 +1,7 @@
 //! `faceoff doctor`: checks what a host offers to agents and their sandbox, and how to fix what is missing.
 //!
 //! A *layer* is one protection of the sandbox, e.g. the memory limit. The configuration may *give up* layers: agents then run
-//! without them. Each report says what was `found` and, as its `cure`, how to fix a problem.
+//! without them. Each report says what was `found` and, as its `fix`, how to solve a problem.
 
 mod check;
 mod clock;
@@ -16,7 +16,7 @@ use anyhow::{Context as _, bail};
 use check::Check;
 use clap::Args;
 use faceoff_sandbox::{
-    HostFeature, Layer, MEMORY_FOLDER, MemoryImage, MemoryImageError, probe_host,
+    Layer, LayerProbe, MEMORY_FOLDER, MemoryImage, MemoryImageError, probe_host,
 };
 use faceoff_store::FreeSpace;
 use runtimes::{RuntimeReport, runtime_reports};
@@ -44,7 +44,8 @@ struct Findings {
     /// Agents can run on this host: every layer is available or given up by the configuration.
     ok: bool,
     /// The sandbox's layers.
-    features: Vec<LayerReport>,
+    #[serde(rename = "features")]
+    layers: Vec<LayerReport>,
     runtimes: Vec<RuntimeReport>,
     in_memory: MemoryReport,
     cpus: CpuReport,
@@ -64,7 +65,8 @@ struct DiskReport {
     /// `None`: the disk cannot be queried.
     free_bytes: Option<u64>,
     found: String,
-    cure: Option<String>,
+    #[serde(rename = "cure")]
+    fix: Option<String>,
 }
 
 /// How `serve` would divide the file descriptors of this shell.
@@ -73,7 +75,8 @@ struct DescriptorReport {
     /// `None`: there are too few.
     divided: Option<Descriptors>,
     found: String,
-    cure: Option<String>,
+    #[serde(rename = "cure")]
+    fix: Option<String>,
 }
 
 /// Whether the runtimes' files are held in memory, where their timing does not reveal what other agents have read.
@@ -81,13 +84,14 @@ struct DescriptorReport {
 struct MemoryReport {
     available: bool,
     found: String,
-    cure: Option<String>,
+    #[serde(rename = "cure")]
+    fix: Option<String>,
 }
 
 #[derive(Debug, Serialize)]
 struct LayerReport {
     #[serde(flatten)]
-    feature: HostFeature,
+    probe: LayerProbe,
     /// Named in `[sandbox] given_up`.
     given_up: bool,
 }
@@ -122,7 +126,7 @@ impl DoctorCommand {
         } else {
             findings.print(&mut out)?;
         }
-        let missing_layers: Vec<_> = missing_layers(&findings.features)
+        let missing_layers: Vec<_> = missing_layers(&findings.layers)
             .map(Layer::as_str)
             .collect();
         if !missing_layers.is_empty() {
@@ -139,20 +143,20 @@ impl DoctorCommand {
 impl Findings {
     fn gather(config: &Config) -> Self {
         let given_up = &config.sandbox.given_up;
-        let features: Vec<_> = probe_host()
+        let layers: Vec<_> = probe_host()
             .into_iter()
-            .map(|feature| LayerReport {
-                given_up: given_up.contains(&feature.layer),
-                feature,
+            .map(|probe| LayerReport {
+                given_up: given_up.contains(&probe.layer),
+                probe,
             })
             .collect();
-        let ok = missing_layers(&features).next().is_none();
-        let unavailable = features.iter().filter(|layer| !layer.feature.available);
-        let unavailable = unavailable.map(|layer| layer.feature.layer).collect();
+        let ok = missing_layers(&layers).next().is_none();
+        let unavailable = layers.iter().filter(|layer| !layer.probe.available);
+        let unavailable = unavailable.map(|layer| layer.probe.layer).collect();
         Self {
             ok,
             runtimes: runtime_reports(config, unavailable),
-            features,
+            layers,
             in_memory: memory_report(config),
             cpus: cpu_report(config),
             descriptors: descriptor_report(config),
@@ -164,11 +168,11 @@ impl Findings {
 }
 
 /// Layers that are neither available nor given up.
-fn missing_layers(features: &[LayerReport]) -> impl Iterator<Item = Layer> {
-    features
+fn missing_layers(layers: &[LayerReport]) -> impl Iterator<Item = Layer> {
+    layers
         .iter()
-        .filter(|layer| !layer.feature.available && !layer.given_up)
-        .map(|layer| layer.feature.layer)
+        .filter(|layer| !layer.probe.available && !layer.given_up)
+        .map(|layer| layer.probe.layer)
 }
 
 fn memory_report(config: &Config) -> MemoryReport {
@@ -180,14 +184,14 @@ fn memory_report(config: &Config) -> MemoryReport {
                 "{} MiB of runtime files are held in memory while serving",
                 bytes >> 20
             ),
-            cure: None,
+            fix: None,
         },
         Err(error) => MemoryReport {
             available: false,
             found: format!(
                 "{error}: without that, an agent can infer which files others have read"
             ),
-            cure: Some(match error {
+            fix: Some(match error {
                 MemoryImageError::NotEnoughMemory { bytes, .. } => {
                     let mib = (bytes >> 20).next_multiple_of(100) + 100;
                     format!(
@@ -235,7 +239,7 @@ fn descriptor_report(config: &Config) -> DescriptorReport {
                 connections,
                 per_address,
             } = divided;
-            let cure = (connections < limits.open).then(|| {
+            let fix = (connections < limits.open).then(|| {
                 format!(
                     "to allow all {} connections of connections.most, raise the limit: ulimit -n, or LimitNOFILE= of systemd",
                     limits.open
@@ -247,13 +251,13 @@ fn descriptor_report(config: &Config) -> DescriptorReport {
                     "at most {limit}, of which {reserved} for evaluations: {connections} connections, \
                     {per_address} per address"
                 ),
-                cure,
+                fix,
             }
         }
         Err(error) => DescriptorReport {
             divided: None,
             found: error.to_string(),
-            cure: None,
+            fix: None,
         },
     }
 }
@@ -285,12 +289,12 @@ fn disk_report(folder: PathBuf, min_free_bytes: u64) -> DiskReport {
             folder,
             free_bytes: None,
             found: "its disk cannot be queried".into(),
-            cure: Some("correct data_dir and scratch_dir of the configuration".into()),
+            fix: Some("correct data_dir and scratch_dir of the configuration".into()),
         };
     };
     let free_bytes = disk.f_bavail.saturating_mul(disk.f_frsize);
     let free_space = FreeSpace::new(vec![existing.to_owned()], min_free_bytes);
-    let cure = free_space.is_short().then(|| {
+    let fix = free_space.is_short().then(|| {
         "the queue would pause and uploads would be refused: free disk space, or lower server.min_free_bytes"
             .to_owned()
     });
@@ -302,7 +306,7 @@ fn disk_report(folder: PathBuf, min_free_bytes: u64) -> DiskReport {
             free_bytes >> 20,
             min_free_bytes >> 20
         ),
-        cure,
+        fix,
     }
 }
 
@@ -311,15 +315,15 @@ mod tests {
     use super::*;
 
     fn findings(available: bool, given_up: bool) -> Findings {
-        let feature = HostFeature {
+        let probe = LayerProbe {
             layer: Layer::CgroupMemory,
             available,
             found: "no memory controller".into(),
-            cure: (!available).then(|| "enable it".into()),
+            fix: (!available).then(|| "enable it".into()),
         };
         Findings {
             ok: available || given_up,
-            features: vec![LayerReport { feature, given_up }],
+            layers: vec![LayerReport { probe, given_up }],
             runtimes: Vec::new(),
             in_memory: memory_report(&Config::default()),
             cpus: cpu_report(&Config::default()),
@@ -331,17 +335,17 @@ mod tests {
     }
 
     #[test]
-    fn full_disk_is_reported_with_its_cure() {
+    fn full_disk_is_reported_with_its_fix() {
         let folder = std::env::temp_dir().join("not/yet/made");
         let ample = disk_report(folder.clone(), 1);
         assert!(
-            ample.free_bytes.is_some() && ample.cure.is_none(),
+            ample.free_bytes.is_some() && ample.fix.is_none(),
             "{ample:?}"
         );
         let full = disk_report(folder, u64::MAX);
         assert_eq!(full.free_bytes.is_some(), ample.free_bytes.is_some());
         assert!(
-            full.cure
+            full.fix
                 .expect("it is full")
                 .contains("server.min_free_bytes")
         );
@@ -351,7 +355,7 @@ mod tests {
     fn missing_layer_is_reported_unless_given_up() {
         let found = findings(false, false);
         assert_eq!(
-            missing_layers(&found.features).collect::<Vec<_>>(),
+            missing_layers(&found.layers).collect::<Vec<_>>(),
             [Layer::CgroupMemory]
         );
         let mut text = Vec::new();
@@ -362,15 +366,15 @@ mod tests {
             "{text}"
         );
         assert!(text.contains("-> enable it"), "{text}");
-        // A cure of several layers is printed once.
+        // A fix of several layers is printed once.
         let mut several = findings(false, false);
-        several.features.extend(found.features);
+        several.layers.extend(found.layers);
         let mut text = Vec::new();
         several.print(&mut text).unwrap();
         let text = String::from_utf8(text).unwrap();
         assert_eq!(text.matches("MISSING").count(), 2, "{text}");
         assert_eq!(text.matches("-> enable it").count(), 1, "{text}");
-        assert_eq!(missing_layers(&findings(false, true).features).count(), 0);
-        assert_eq!(missing_layers(&findings(true, false).features).count(), 0);
+        assert_eq!(missing_layers(&findings(false, true).layers).count(), 0);
+        assert_eq!(missing_layers(&findings(true, false).layers).count(), 0);
     }
 }

@@ -76,7 +76,7 @@ pub struct EvalCommand {
     /// Print one JSON object, and notes to standard error
     #[arg(long)]
     json: bool,
-    /// A server's configuration, for limits, runtimes and given-up layers, and for the weights, tier bounds,
+    /// A server's configuration, for limits, runtimes, disabled layers of the sandbox, and the weights, tier bounds,
     /// perturbations and allowed faults of [evaluation]
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,

@@ -89,16 +89,16 @@ impl GameCommand {
     /// # Errors
     /// If the server cannot be reached or refuses.
     pub fn run(self) -> anyhow::Result<()> {
-        super::block_on(self.act())
+        super::block_on(self.run_action())
     }
 
-    async fn act(self) -> anyhow::Result<()> {
+    async fn run_action(self) -> anyhow::Result<()> {
         let client = self.server.client_with_optional_token()?;
         match self.action {
             Action::Test(tournament) => {
                 let id = tournament.find(&client).await?;
                 let requested = client.request_test_games(id, None).await?;
-                print(self.server.json, &requested, games::requested_text)
+                print(self.server.json, &requested, games::test_games_text)
             }
             Action::Friendly {
                 opponent,

@@ -1,7 +1,7 @@
 //! `faceoff init`: writes a default configuration.
 
 use super::output::print;
-use crate::config::{COMMENTED, DEFAULT_FILE};
+use crate::config::{COMMENTED_DEFAULTS, DEFAULT_FILE};
 use anyhow::{Context, bail};
 use clap::Args;
 use serde_json::json;
@@ -38,7 +38,7 @@ impl InitCommand {
             }
             Err(error) => return Err(error).with_context(|| format!("creating {shown}")),
         };
-        file.write_all(COMMENTED.as_bytes())
+        file.write_all(COMMENTED_DEFAULTS.as_bytes())
             .with_context(|| format!("writing {shown}"))?;
         print(self.json, &json!({ "file": self.file }), |_| {
             format!(

@@ -72,7 +72,7 @@ impl LinkCommand {
             let new = NewLink {
                 expires_in_s: Some(self.hours * 3600),
             };
-            let link = client.link(target, new).await?;
+            let link = client.create_link(target, new).await?;
             print(self.server.json, &link, |link| {
                 format!(
                     "{}\nThe link is valid until {} for everyone who has it. It is not shown again.",

@@ -53,9 +53,9 @@ pub(super) fn open(
     Ok(bundle)
 }
 
-/// Gives up the layers of the sandbox that this user cannot get on this host: developers run their own agents, which they could also run
-/// without a sandbox. First the command starts again in a scope of systemd, if that gives the user control groups. Returns the note that
-/// says which layers are missing, if any are.
+/// Gives up the layers of the sandbox that are not available to this user on this host: developers run their own agents, which they
+/// could also run without a sandbox. If a layer of control groups is missing, the command is first restarted in a systemd scope that
+/// may provide it. Returns a note with the missing layers, if any.
 ///
 /// # Errors
 /// If a bundle is an archive, which may be another team's, and a layer is missing that keeps agents from the user's files and the
@@ -100,16 +100,16 @@ pub(super) fn give_up_unavailable_layers(
 }
 
 /// The runtime that an organiser makes with `docker/runtime.sh`.
-const LEARNING_RUNTIME: &str = "python3-ml";
+const ML_RUNTIME: &str = "python3-ml";
 
 /// Uses `python3-ml` from its default folders if it is there and not configured.
 pub(super) fn adopt_default_runtime(config: &mut Config) {
     let has_python = |folder: &PathBuf| folder.join("bin/python3").exists();
-    if !config.runtimes.contains_key(LEARNING_RUNTIME)
+    if !config.runtimes.contains_key(ML_RUNTIME)
         && let Some(folder) = default_folders().into_iter().find(has_python)
     {
         let runtime = RuntimeConfig::Folder(folder);
-        config.runtimes.insert(LEARNING_RUNTIME.to_owned(), runtime);
+        config.runtimes.insert(ML_RUNTIME.to_owned(), runtime);
     }
 }
 
@@ -124,7 +124,7 @@ pub(super) fn check_runtime(config: &Config, runtime: &str) -> anyhow::Result<()
     }
     let missing =
         format!("agent.toml names the runtime {runtime:?}, which this machine does not have");
-    if runtime == LEARNING_RUNTIME {
+    if runtime == ML_RUNTIME {
         let folders = default_folders();
         let places: Vec<String> = folders
             .iter()
@@ -157,7 +157,7 @@ fn default_folders() -> Vec<PathBuf> {
     data.map(|data| data.join("faceoff"))
         .into_iter()
         .chain([PathBuf::from("/srv/faceoff")])
-        .map(|folder| folder.join(LEARNING_RUNTIME))
+        .map(|folder| folder.join(ML_RUNTIME))
         .collect()
 }
 

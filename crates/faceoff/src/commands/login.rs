@@ -162,5 +162,7 @@ async fn create_token(client: &Client, name: &str, password: &str) -> anyhow::Re
         expires_at: None,
         team: None,
     };
-    client.token_by_password(name, password, &new).await
+    client
+        .create_token_with_password(name, password, &new)
+        .await
 }

@@ -8,7 +8,7 @@ pub(super) fn read_stdin() -> anyhow::Result<String> {
     let mut text = String::new();
     std::io::stdin()
         .read_to_string(&mut text)
-        .context("reading the password from standard input")?;
+        .context("reading the secret from standard input")?;
     Ok(text.trim_end_matches(['\r', '\n']).to_owned())
 }
 

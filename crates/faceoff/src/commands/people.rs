@@ -34,7 +34,7 @@ pub(super) fn changed_access_text(changed: &ChangedAccessView) -> String {
     user_line(&changed.user) + &ended_text(changed.ended.as_ref())
 }
 
-/// Lines about what ended with the rights of its maker; empty if nothing did.
+/// One line for each credential that ended because its creator lost access; empty if none did.
 pub(super) fn ended_text(ended: Option<&EndedCredentialsView>) -> String {
     let Some(ended) = ended else {
         return String::new();

@@ -13,7 +13,7 @@ mod table;
 
 use super::{notes::Notes, series_folders};
 use anyhow::{Context, bail};
-use attempt::{Attempt, Games};
+use attempt::{Attempt, GamePlayer};
 use bar::Bar;
 use clap::Args;
 use faceoff_dataset::game::{GAME_FILE, remove_game, side_file};
@@ -84,7 +84,7 @@ fn play_game(options: &PlayOptions, matchup: &Matchup, results: &Results) -> any
         swapped: false,
         out: &options.out,
     };
-    let played = Games::new(matchup, Notes::beside(options.json)).play(&attempt, &bar);
+    let played = GamePlayer::new(matchup, Notes::beside(options.json)).play(&attempt, &bar);
     bar.finish();
     let GameReport { archives, logs, .. } =
         played.map_err(with_advice).context("there is no result")?;

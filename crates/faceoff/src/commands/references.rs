@@ -140,13 +140,14 @@ pub(super) async fn find_evaluation(client: &Client, text: &str) -> anyhow::Resu
 /// The evaluation of a team on a day: one that the caller may see before its release, or one of the boards of that day, first of
 /// the current stage.
 async fn find_by_day(client: &Client, team: &str, day: Date) -> anyhow::Result<EvaluationId> {
-    let own = unless(client.evaluations(Some(day)).await, is_hidden)?.unwrap_or_default();
+    let own =
+        none_on_expected_error(client.evaluations(Some(day)).await, is_hidden)?.unwrap_or_default();
     let has_name = |name: &str| name.to_lowercase() == team.to_lowercase();
     if let Some(evaluation) = own.iter().find(|found| has_name(found.team_name.as_str())) {
         return Ok(evaluation.id);
     }
     let mut names = BTreeSet::new();
-    let stages = unless(client.stages().await, is_hidden)?.unwrap_or_default();
+    let stages = none_on_expected_error(client.stages().await, is_hidden)?.unwrap_or_default();
     let other_stages = stages.iter().map(|stage| Some(stage.id));
     for stage in iter::once(None).chain(other_stages) {
         // A team's newest result up to the day.
@@ -159,7 +160,7 @@ async fn find_by_day(client: &Client, team: &str, day: Date) -> anyhow::Result<E
         let has_no_board = |error: &anyhow::Error| {
             is_hidden(error) || is_refused_with(error, StatusCode::NOT_FOUND)
         };
-        let board = unless(client.board(None, &query).await, has_no_board)?;
+        let board = none_on_expected_error(client.board(None, &query).await, has_no_board)?;
         for row in board.into_iter().flat_map(|board| board.rows) {
             if row.day == day && has_name(row.team.as_str()) {
                 return Ok(row.evaluation);
@@ -186,8 +187,8 @@ fn is_hidden(error: &anyhow::Error) -> bool {
         .any(|status| is_refused_with(error, status))
 }
 
-/// The response; `None` after an expected refusal.
-fn unless<T>(
+/// The response; `None` if it is an error for which `is_expected` is true.
+fn none_on_expected_error<T>(
     response: anyhow::Result<T>,
     is_expected: impl Fn(&anyhow::Error) -> bool,
 ) -> anyhow::Result<Option<T>> {
@@ -247,10 +248,16 @@ mod tests {
             .into())
         };
         for status in [401, 403] {
-            assert_eq!(unless(refused(status), is_hidden).unwrap(), None);
+            assert_eq!(
+                none_on_expected_error(refused(status), is_hidden).unwrap(),
+                None
+            );
         }
         for status in [404, 429, 500] {
-            assert!(unless(refused(status), is_hidden).is_err(), "{status}");
+            assert!(
+                none_on_expected_error(refused(status), is_hidden).is_err(),
+                "{status}"
+            );
         }
     }
 }

@@ -48,7 +48,7 @@ pub(super) fn season_text(season: &SeasonView) -> String {
         ),
         None => String::new(),
     };
-    let queue = match &season.paused {
+    let pause_text = match &season.paused {
         Some(decision) => {
             let since = time_text(decision.at);
             format!("\npaused     since {since}: {}", decision.reason)
@@ -56,7 +56,7 @@ pub(super) fn season_text(season: &SeasonView) -> String {
         None => String::new(),
     };
     format!(
-        "{} ({}), {} evaluation days\ncommitment {}\n{state}{queue}{archived}",
+        "{} ({}), {} evaluation days\ncommitment {}\n{state}{pause_text}{archived}",
         season.name,
         season.ruleset,
         season.days.len(),

@@ -18,7 +18,7 @@ mod tasks;
 
 pub use data_folder::{ADMIN_TOKEN_FILE, lock};
 pub use http::shutdown_signal;
-pub use sandbox::{check_sandbox, hold_in_memory};
+pub use sandbox::{check_sandbox, copy_to_memory};
 
 use super::config_file::ConfigFile;
 use crate::{config::Config, descriptors::Descriptors, log::LogFormat};

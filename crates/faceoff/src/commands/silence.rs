@@ -8,7 +8,7 @@ use std::{
 };
 
 /// Time without any answer after which the likely causes are printed.
-const EXPLAINED_SILENCE: Duration = Duration::from_secs(5);
+const EXPLANATION_DELAY: Duration = Duration::from_secs(5);
 
 const LIKELY_CAUSES: &str = "\
 Likely causes:
@@ -36,12 +36,12 @@ pub(super) fn explain(
     print: impl Fn(fmt::Arguments<'_>),
 ) {
     for agent in agents {
-        match ended_starts.recv_timeout(EXPLAINED_SILENCE) {
+        match ended_starts.recv_timeout(EXPLANATION_DELAY) {
             Ok(()) => continue,
             Err(RecvTimeoutError::Disconnected) => return,
             Err(RecvTimeoutError::Timeout) => print(format_args!(
                 "note: {agent} has not answered `hello` for {} s. {LIKELY_CAUSES}",
-                EXPLAINED_SILENCE.as_secs()
+                EXPLANATION_DELAY.as_secs()
             )),
         }
         if ended_starts.recv().is_err() {

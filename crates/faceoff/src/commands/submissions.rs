@@ -86,10 +86,10 @@ impl SubmissionsCommand {
     /// # Errors
     /// If the server cannot be reached or refuses.
     pub fn run(self) -> anyhow::Result<()> {
-        super::block_on(self.act())
+        super::block_on(self.run_action())
     }
 
-    async fn act(self) -> anyhow::Result<()> {
+    async fn run_action(self) -> anyhow::Result<()> {
         let json = self.server.json;
         let client = self.server.client()?;
         match self.action {
@@ -111,14 +111,14 @@ impl SubmissionsCommand {
                     label: Some(label),
                     ..SubmissionChange::default()
                 };
-                describe(&client, json, submission.find(&client).await?, &change).await
+                change_submission(&client, json, submission.find(&client).await?, &change).await
             }
             Action::Note { submission, note } => {
                 let change = SubmissionChange {
                     note: Some(note),
                     ..SubmissionChange::default()
                 };
-                describe(&client, json, submission.find(&client).await?, &change).await
+                change_submission(&client, json, submission.find(&client).await?, &change).await
             }
             Action::Download { submission, file } => {
                 let id = submission.find(&client).await?;
@@ -147,14 +147,14 @@ impl SubmissionsCommand {
     }
 }
 
-async fn describe(
+async fn change_submission(
     client: &Client,
     json: bool,
     submission: SubmissionId,
     change: &SubmissionChange,
 ) -> anyhow::Result<()> {
-    let described = client.describe(submission, change).await?;
-    print(json, &described, submission_line)
+    let changed = client.change_submission(submission, change).await?;
+    print(json, &changed, submission_line)
 }
 
 /// Downloads the bundle of a submission with the client's token.

@@ -22,7 +22,7 @@ use std::{path::PathBuf, time::Duration};
 /// Interval between requests for the result of the validation.
 const POLL_INTERVAL: Duration = Duration::from_millis(500);
 /// Time for which failing requests for the result are repeated.
-const PATIENCE: Duration = Duration::from_mins(5);
+const RETRY_TIMEOUT: Duration = Duration::from_mins(5);
 
 /// Uploads a bundle and waits for its validation; the exit status is 0 only if it is valid. Of a folder, all files are
 /// packed except those that no agent needs (version control, caches, environments, builds, editor files; see --dry-run)
@@ -107,8 +107,8 @@ async fn print_validation(client: &Client, submission: &SubmissionView) -> anyho
             let agent = submission.agent_name.as_deref().unwrap_or("the agent");
             print_log(log.as_deref());
             println!("valid: {agent} starts, responds and meets the time limits");
-            // The submission is valid, whatever becomes of this question.
-            match retry_temporary(PATIENCE, async || client.me().await).await {
+            // If this request fails, the submission is still valid.
+            match retry_temporary(RETRY_TIMEOUT, async || client.me().await).await {
                 Ok(me) => println!("{}", next_cutoff_text(&me, submission.id)),
                 Err(error) => eprintln!("the next cutoff is not known: {error:#}"),
             }
@@ -130,7 +130,7 @@ async fn wait_for_validation(
         tokio::time::sleep(POLL_INTERVAL).await;
         let id = submission.id;
         // The upload is done: a restart of the server meanwhile changes nothing.
-        submission = retry_temporary(PATIENCE, async || client.submission(id).await)
+        submission = retry_temporary(RETRY_TIMEOUT, async || client.submission(id).await)
             .await
             .with_context(|| {
                 format!(

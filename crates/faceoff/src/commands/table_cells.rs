@@ -4,13 +4,13 @@ use crate::competition::competition;
 use faceoff_types::{ComputationTimeSummary, ViolationCounts};
 use std::fmt::Display;
 
-/// Headings of the columns of [`violations`].
-pub(super) fn violation_heads() -> String {
+/// Headings of the columns of [`violation_cells`].
+pub(super) fn violation_headings() -> String {
     columns(competition().violations.iter().map(|info| &info.short))
 }
 
-/// The number of episodes with each kind of violation.
-pub(super) fn violations(counts: &ViolationCounts) -> String {
+/// The number of episodes (of a game: windows) with each kind of violation, as text.
+pub(super) fn violation_cells(counts: &ViolationCounts) -> String {
     columns(
         competition()
             .violations
@@ -30,8 +30,8 @@ pub(super) fn percent_interval(rates: [f64; 2]) -> String {
     format!("{low:.1} to {high:.1} %")
 }
 
-/// Mean, 99th percentile and maximum of computation times, in milliseconds.
-pub(super) fn milliseconds(time_s: ComputationTimeSummary) -> String {
+/// Mean, 99th percentile and maximum of computation times, in milliseconds, as text.
+pub(super) fn computation_time_cell(time_s: ComputationTimeSummary) -> String {
     let [mean, p99, max] = [time_s.mean, time_s.p99, time_s.max].map(|seconds| 1e3 * seconds);
     format!("{mean:.2} / {p99:.2} / {max:.2}")
 }

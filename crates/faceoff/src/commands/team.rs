@@ -99,17 +99,19 @@ impl TeamCommand {
     /// # Errors
     /// If the server cannot be reached or refuses.
     pub fn run(self) -> anyhow::Result<()> {
-        super::block_on(async { act(&self.server.client()?, self.server.json, self.action).await })
+        super::block_on(async {
+            run_action(&self.server.client()?, self.server.json, self.action).await
+        })
     }
 }
 
-async fn own_team(client: &Client) -> anyhow::Result<TeamId> {
+async fn own_team_id(client: &Client) -> anyhow::Result<TeamId> {
     let caller = client.whoami().await?;
     let team = caller.team.map(|team| team.id);
     team.context("the token does not belong to a team; organisers use faceoff admin")
 }
 
-async fn own_person(client: &Client) -> anyhow::Result<UserId> {
+async fn own_user_id(client: &Client) -> anyhow::Result<UserId> {
     let caller = client.whoami().await?;
     match caller.person {
         Some(person) => Ok(person.id),
@@ -119,10 +121,10 @@ async fn own_person(client: &Client) -> anyhow::Result<UserId> {
     }
 }
 
-async fn act(client: &Client, json: bool, action: Action) -> anyhow::Result<()> {
+async fn run_action(client: &Client, json: bool, action: Action) -> anyhow::Result<()> {
     match action {
         Action::Show => {
-            let team = client.team(own_team(client).await?).await?;
+            let team = client.team(own_team_id(client).await?).await?;
             print(json, &team, team_text)
         }
         Action::Change {
@@ -140,24 +142,26 @@ async fn act(client: &Client, json: bool, action: Action) -> anyhow::Result<()> 
                 baseline: None,
                 declines_friendly_games,
             };
-            let team = client.change_team(own_team(client).await?, &change).await?;
+            let team = client
+                .change_team(own_team_id(client).await?, &change)
+                .await?;
             print(json, &team, team_text)
         }
         Action::Storage => {
-            let storage = client.team_storage(own_team(client).await?).await?;
+            let storage = client.team_storage(own_team_id(client).await?).await?;
             print(json, &storage, storage_line)
         }
         Action::Members => {
-            let people = client.users().await?;
+            let users = client.users().await?;
             print_list(
                 json,
-                &people,
+                &users,
                 user_line,
                 "no members yet; invite one with faceoff team invite NOTE",
             )
         }
         Action::RenameMe { name } => {
-            let renamed = client.rename_user(own_person(client).await?, name).await?;
+            let renamed = client.rename_user(own_user_id(client).await?, name).await?;
             print(json, &renamed, user_line)
         }
         Action::Invite { note } => {
@@ -167,17 +171,17 @@ async fn act(client: &Client, json: bool, action: Action) -> anyhow::Result<()> 
         Action::Invitations => list_invitations(client, json).await,
         Action::Uninvite { invitation } => uninvite(client, json, invitation).await,
         Action::Leave { confirm } => {
-            let id = own_person(client).await?;
-            let person = client.remove_user(id, confirm).await?;
-            print(json, &person, changed_access_text)
+            let id = own_user_id(client).await?;
+            let user = client.remove_user(id, confirm).await?;
+            print(json, &user, changed_access_text)
         }
         Action::Retire { confirm } => {
-            let team = own_team(client).await?;
+            let team = own_team_id(client).await?;
             let team = client.retire_team(team, confirm).await?;
             print(json, &team, team_text)
         }
         Action::Return => {
-            let team = client.return_team(own_team(client).await?).await?;
+            let team = client.return_team(own_team_id(client).await?).await?;
             print(json, &team, team_text)
         }
         Action::Ask { text } => {
@@ -202,8 +206,8 @@ async fn act(client: &Client, json: bool, action: Action) -> anyhow::Result<()> 
         Action::Terms {
             accept: Some(version),
         } => {
-            let person = client.accept_terms(version).await?;
-            print(json, &person, user_line)
+            let user = client.accept_terms(version).await?;
+            print(json, &user, user_line)
         }
     }
 }

@@ -9,7 +9,7 @@ use crate::client::Client;
 use anyhow::Context;
 use clap::{Args, Subcommand};
 use faceoff_api::{
-    requests::{Made, NewToken},
+    requests::{CreatedWithToken, NewToken},
     views::token::TokenView,
 };
 use faceoff_types::{TeamId, TokenId};
@@ -50,10 +50,10 @@ pub(super) enum TokenAction {
         /// The token's id
         #[arg(id = "id", value_name = "ID")]
         token: TokenId,
-        /// Keep what was made with it
+        /// Keep the tokens, invitations and webhooks that were made with the token
         #[arg(long)]
         keep_made: bool,
-        /// End what was made with it, also if it is your own
+        /// End the tokens, invitations and webhooks that were made with the token, even if it is your own
         #[arg(long, conflicts_with = "keep_made")]
         end_made: bool,
     },
@@ -65,12 +65,18 @@ impl TokenCommand {
     /// # Errors
     /// If the server cannot be reached or refuses.
     pub fn run(self) -> anyhow::Result<()> {
-        super::block_on(async { act(&self.server.client()?, self.server.json, self.action).await })
+        super::block_on(async {
+            run_action(&self.server.client()?, self.server.json, self.action).await
+        })
     }
 }
 
 /// Runs an action with the client's token.
-pub(super) async fn act(client: &Client, json: bool, action: TokenAction) -> anyhow::Result<()> {
+pub(super) async fn run_action(
+    client: &Client,
+    json: bool,
+    action: TokenAction,
+) -> anyhow::Result<()> {
     match action {
         TokenAction::List => {
             let tokens = client.tokens().await?;
@@ -115,8 +121,8 @@ pub(super) async fn act(client: &Client, json: bool, action: TokenAction) -> any
             end_made,
         } => {
             let made = match (keep_made, end_made) {
-                (true, _) => Some(Made::Keep),
-                (false, true) => Some(Made::End),
+                (true, _) => Some(CreatedWithToken::Keep),
+                (false, true) => Some(CreatedWithToken::End),
                 (false, false) => None,
             };
             let revoked = client.revoke_token(token, made).await?;
@@ -139,7 +145,7 @@ fn token_line(token: &TokenView, now: Timestamp) -> String {
     let owner = match (token.team, token.person) {
         (Some(id), _) => format!("team:{id}"),
         (None, Some(id)) => format!("person:{id}"),
-        // Of the operator with access to the server's data folder.
+        // The host's token: it belongs to the operator, who has access to the server's data folder.
         (None, None) => "host".to_owned(),
     };
     let last_use = token.last_used_at.map_or_else(

@@ -56,10 +56,10 @@ impl TournamentCommand {
     /// # Errors
     /// If the server cannot be reached or refuses.
     pub fn run(self) -> anyhow::Result<()> {
-        super::block_on(self.act())
+        super::block_on(self.run_action())
     }
 
-    async fn act(self) -> anyhow::Result<()> {
+    async fn run_action(self) -> anyhow::Result<()> {
         let client = self.server.client_with_optional_token()?;
         match self.action {
             Action::List => {

@@ -151,7 +151,7 @@ impl VerifyCommand {
                 self.verify_dataset()?,
             )));
         }
-        game::refuse_season(self.secret.is_some())?;
+        game::refuse_secret(self.secret.is_some())?;
         let simulated = game::verify(&self.dataset, self.blake3.as_ref())?;
         Ok(VerifiedRecording::Game(Box::new(simulated)))
     }

@@ -87,12 +87,18 @@ impl WebhookCommand {
     /// # Errors
     /// If the server cannot be reached or refuses.
     pub fn run(self) -> anyhow::Result<()> {
-        super::block_on(async { act(&self.server.client()?, self.server.json, self.action).await })
+        super::block_on(async {
+            run_action(&self.server.client()?, self.server.json, self.action).await
+        })
     }
 }
 
 /// Runs an action with the client's token.
-pub(super) async fn act(client: &Client, json: bool, action: WebhookAction) -> anyhow::Result<()> {
+pub(super) async fn run_action(
+    client: &Client,
+    json: bool,
+    action: WebhookAction,
+) -> anyhow::Result<()> {
     match action {
         WebhookAction::List => {
             let webhooks = client.webhooks().await?;

@@ -4,7 +4,7 @@
 use super::{
     capabilities::own_capabilities,
     files_client::files_client,
-    serve::{check_sandbox, hold_in_memory},
+    serve::{check_sandbox, copy_to_memory},
 };
 use crate::{config::Config, log::LogFormat};
 use anyhow::{Context as _, anyhow};
@@ -13,7 +13,7 @@ use faceoff_metrics::Metrics;
 use faceoff_sandbox::probe_host;
 use faceoff_types::is_printable;
 use faceoff_wire::remote::WorkerCapabilities;
-use faceoff_worker::{CpuLayout, RemoteWorker, SlotThreads, SlotsConfig};
+use faceoff_worker::{CpuLayout, RemoteWorkerConfig, SlotThreads, SlotsConfig};
 use jiff::SignedDuration;
 use std::{
     fs,
@@ -98,17 +98,17 @@ impl WorkerCommand {
         );
         capabilities.labels = self.labels;
         let http = files_client(config.nats.ca_file.as_deref())?;
-        // Kept as long as agents run.
-        let _image = hold_in_memory(&mut agent.runtimes, config.sandbox.resident_bytes);
+        // The runtimes' files in memory, kept as long as agents run.
+        let _memory_copy = copy_to_memory(&mut agent.runtimes, config.sandbox.resident_bytes);
         let scratch_dir = config.scratch_dir();
         fs::create_dir_all(&scratch_dir)
             .with_context(|| format!("creating the folder {}", scratch_dir.display()))?;
-        let worker = RemoteWorker {
+        let worker = RemoteWorkerConfig {
             nats,
             name,
             capabilities,
             http,
-            ends_after: self.drain_after_idle.map(SignedDuration::unsigned_abs),
+            exit_after_idle: self.drain_after_idle.map(SignedDuration::unsigned_abs),
             slots: SlotsConfig {
                 cpus: CpuLayout::for_server(config.slots(), &config.workers.agent_cpus),
                 threads: SlotThreads::from_caller(),
@@ -127,7 +127,7 @@ impl WorkerCommand {
     }
 }
 
-async fn run_until_signal(worker: RemoteWorker) -> anyhow::Result<()> {
+async fn run_until_signal(worker: RemoteWorkerConfig) -> anyhow::Result<()> {
     let shutdown = CancellationToken::new();
     let mut worker_task = tokio::spawn(faceoff_worker::run_remote_worker(worker, shutdown.clone()));
     let signal = super::serve::shutdown_signal()?;

@@ -25,8 +25,8 @@ pub struct NatsSection {
     /// address.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub files_url: Option<String>,
-    /// S3-compatible bucket for bundles and recordings instead. Keys, region and endpoint come from the environment
-    /// (`AWS_ACCESS_KEY_ID` …).
+    /// S3-compatible bucket through which bundles and recordings are transferred, instead of through this server. Keys, region and
+    /// endpoint come from the environment (`AWS_ACCESS_KEY_ID` …).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bucket: Option<String>,
 }

@@ -89,7 +89,7 @@ fn all_sections_are_read() {
     assert_eq!(loss("steps"), Some(Magnitude::Counts([5, 20])));
     let settings = config.settings().unwrap();
     assert_eq!(settings.publishes, Publication::Never);
-    assert_eq!(settings.standings, CountingResult::MeanOfLast(5));
+    assert_eq!(settings.counting_result, CountingResult::MeanOfLast(5));
     assert_eq!(config.slots(), 3);
     assert_eq!(config.limits.pids, 9);
     assert_eq!(config.limits.open_files, Limits::default().open_files);
@@ -156,13 +156,16 @@ fn error_names_the_field() {
 #[test]
 fn commented_file_has_the_defaults_and_is_documented() {
     // Values without a fixed default are comments in the file.
-    assert_eq!(Config::parse(COMMENTED).unwrap(), Config::default());
+    assert_eq!(
+        Config::parse(COMMENTED_DEFAULTS).unwrap(),
+        Config::default()
+    );
     let documentation = include_str!("../../../../docs/configuration.md");
     let block = documentation
         .split("```toml\n")
         .nth(1)
         .and_then(|rest| rest.split("```").next());
-    assert_eq!(block, Some(COMMENTED));
+    assert_eq!(block, Some(COMMENTED_DEFAULTS));
 }
 
 #[test]
@@ -184,7 +187,7 @@ fn commented_file_explains_all_values() {
         assert_eq!(old_value, None, "{name}");
     }
     for (section, values) in &written {
-        let (_, rest) = COMMENTED
+        let (_, rest) = COMMENTED_DEFAULTS
             .split_once(&format!("\n[{section}"))
             .expect(section);
         let lines: Vec<&str> = rest
@@ -341,7 +344,7 @@ fn sandbox_page_has_the_default_limits() {
         ),
         format!(
             "| log that is kept (standard error) | the last {} KiB |",
-            limits.stderr_tail_bytes >> 10
+            limits.stderr_kept_bytes >> 10
         ),
         format!("| start, until `ready` | {} s |", time.startup_s),
         format!("| answer to `reset` | {} s |", time.reset_s),

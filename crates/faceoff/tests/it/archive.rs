@@ -55,7 +55,7 @@ fn assert_refused(output: &Output, expected: &[&str]) {
 }
 
 /// A server with a season that has one evaluation with a real dataset.
-struct Site {
+struct TestServer {
     url: String,
     store: Store,
     folder: TempDir,
@@ -68,7 +68,7 @@ fn fixture(name: &str) -> PathBuf {
         .join(name)
 }
 
-async fn start_site() -> Site {
+async fn start_test_server() -> TestServer {
     let folder = tempfile::tempdir().unwrap();
     let store = new_store(folder.path()).await;
     assert!(
@@ -122,7 +122,7 @@ async fn start_site() -> Site {
         ConnectionLimits::default(),
         std::future::pending(),
     ));
-    Site {
+    TestServer {
         url,
         store,
         folder,
@@ -285,10 +285,10 @@ async fn get(url: String, token: Option<&str>) -> (u16, String) {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn exported_season_is_shown_on_another_host() {
-    let site = start_site().await;
+    let server = start_test_server().await;
     let other_host = tempfile::tempdir().unwrap();
     let folder = other_host.path().to_owned();
-    let url = site.url.clone();
+    let url = server.url.clone();
     blocking(move || {
         let export = |arguments: &[&str]| {
             let command = ["admin", "--server", &url, "--token", ADMIN, "export"];
@@ -346,7 +346,7 @@ async fn exported_season_is_shown_on_another_host() {
     })
     .await;
 
-    let board = get(format!("{}/api/v1/board", site.url), None).await;
+    let board = get(format!("{}/api/v1/board", server.url), None).await;
     assert!(board.1.contains("Alpha"), "{board:?}");
     for name in ["public", "all"] {
         let folder = other_host.path().to_owned();
@@ -360,7 +360,7 @@ async fn exported_season_is_shown_on_another_host() {
             get(format!("{}/api/v1/board", served.url), None).await,
             board
         );
-        let path = format!("/api/v1/evaluations/{}", site.evaluation);
+        let path = format!("/api/v1/evaluations/{}", server.evaluation);
         let (status, _) = get(format!("{}{path}/dataset", served.url), None).await;
         assert_eq!(status, 200, "{name}");
         let (_, page) = get(served.url.clone(), None).await;
@@ -381,8 +381,8 @@ async fn exported_season_is_shown_on_another_host() {
             "no runtimes are prepared: {log}"
         );
     }
-    drop(site.folder);
-    site.store.close().await;
+    drop(server.folder);
+    server.store.close().await;
 }
 
 /// Writes an archive with these files.

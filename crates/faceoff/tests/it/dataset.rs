@@ -28,7 +28,7 @@ fn eval(out: &Path, extra: &[&str]) {
 }
 
 /// The folder of a sandboxed evaluation of two tasks.
-fn evaluated() -> PathBuf {
+fn evaluation_folder() -> PathBuf {
     static DIR: OnceLock<TempDir> = OnceLock::new();
     let dir = DIR.get_or_init(|| {
         let dir = tempfile::tempdir().unwrap();
@@ -51,7 +51,7 @@ fn stdout(args: &[&str]) -> String {
 
 #[test]
 fn evaluation_verifies_with_any_number_of_workers() {
-    let out = evaluated();
+    let out = evaluation_folder();
     let dir = out.to_str().unwrap();
     let line = stdout(&["verify", dir]);
     assert!(line.contains("4 episodes"), "{line}");
@@ -72,10 +72,10 @@ fn evaluation_verifies_with_any_number_of_workers() {
 }
 
 #[test]
-fn difference_ends_with_1_and_unreadable_dataset_with_2() {
+fn difference_exits_with_1_and_unreadable_dataset_with_2() {
     let dir = tempfile::tempdir().unwrap();
     let copy = dir.path().join("dataset.zip");
-    let good = fs::read(evaluated().join("dataset.zip")).unwrap();
+    let good = fs::read(evaluation_folder().join("dataset.zip")).unwrap();
     let verify = |bytes: &[u8], extra: &[&str]| {
         fs::write(&copy, bytes).unwrap();
         let output = faceoff(&[&["verify", copy.to_str().unwrap()], extra].concat());
@@ -119,7 +119,7 @@ fn difference_ends_with_1_and_unreadable_dataset_with_2() {
 
 #[test]
 fn episodes_are_listed_and_steps_are_sliced() {
-    let out = evaluated();
+    let out = evaluation_folder();
     let dir = out.to_str().unwrap();
     let list = stdout(&["dataset", "list", dir]);
     assert_eq!(list.lines().count(), 5, "{list}");
@@ -254,7 +254,7 @@ fn workers_and_shards_only_change_times() {
 
 #[test]
 fn archive_hash_is_printed_and_compared() {
-    let archive = evaluated().join("dataset.zip");
+    let archive = evaluation_folder().join("dataset.zip");
     let hash = blake3::hash(&fs::read(&archive).unwrap()).to_hex();
     let path = archive.to_str().unwrap();
     let line = stdout(&["verify", path, "--blake3", &hash]);

@@ -150,9 +150,10 @@ fn silent_agent_is_stopped_after_its_first_start() {
     );
 }
 
-/// The agent answers `hello` at once, and takes longer for its first reset than a silence that is explained.
+/// The agent answers `hello` at once. Its first reset takes longer than the time without an answer after which the likely causes
+/// are printed.
 #[test]
-fn slow_first_reset_is_no_silence() {
+fn slow_first_reset_prints_no_silence_note() {
     let dir = tempfile::tempdir().unwrap();
     let bundle = dir.path().join("bundle");
     fs::create_dir(&bundle).unwrap();
@@ -209,7 +210,7 @@ fn several_seeds_are_evaluated_and_pooled() {
 }
 
 #[test]
-fn missing_runtime_is_reported_once_with_its_cure() {
+fn missing_runtime_is_reported_once_with_its_fix() {
     let dir = tempfile::tempdir().unwrap();
     let bundle = dir.path().join("bundle");
     fs::create_dir(&bundle).unwrap();

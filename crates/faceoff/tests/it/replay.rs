@@ -10,7 +10,7 @@ use std::{
 use tempfile::TempDir;
 
 /// An evaluation with two episodes per task, of an agent that violates limits and whose name must be escaped.
-pub fn evaluated() -> &'static Path {
+pub fn scratch_with_evaluation() -> &'static Path {
     static DIR: OnceLock<TempDir> = OnceLock::new();
     let dir = DIR.get_or_init(|| {
         let dir = tempfile::tempdir().unwrap();
@@ -47,7 +47,7 @@ pub fn evaluated() -> &'static Path {
 
 /// Draws an episode; returns the output and the file.
 fn replay(task: &str, episode: &str, file: &str) -> (String, PathBuf) {
-    let dir = evaluated();
+    let dir = scratch_with_evaluation();
     let out = dir.join(file);
     let output = faceoff(&[
         "replay",
@@ -155,7 +155,7 @@ fn picture_is_well_formed() {
 
 #[test]
 fn invalid_replay_is_refused_with_a_reason() {
-    let dir = evaluated();
+    let dir = scratch_with_evaluation();
     let out = dir.join("out");
     let refused = |dataset: &Path, episode: &str, file: &str| {
         let file = dir.join(file);

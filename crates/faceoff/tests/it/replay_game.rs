@@ -39,7 +39,7 @@ fn replay(recording: &Path, out: &Path, options: &[&str]) -> Output {
 }
 
 /// Draws a recording to a new file with this name; returns the output and the content of the file.
-fn drawn(recording: &Path, name: &str, options: &[&str]) -> (String, String) {
+fn draw_to_new_file(recording: &Path, name: &str, options: &[&str]) -> (String, String) {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join(name);
     let output = replay(recording, &out, options);
@@ -57,13 +57,13 @@ fn refusal(recording: &Path, options: &[&str]) -> String {
 }
 
 fn summary(recording: &Path) -> Value {
-    let (json, _) = drawn(recording, "game.html", &["--json"]);
+    let (json, _) = draw_to_new_file(recording, "game.html", &["--json"]);
     serde_json::from_str(&json).unwrap()
 }
 
 #[test]
 fn game_page_is_self_contained_and_links_its_events() {
-    let (stdout, page) = drawn(&first_game(), "game.html", &[]);
+    let (stdout, page) = draw_to_new_file(&first_game(), "game.html", &[]);
     let lines: Vec<&str> = stdout.lines().collect();
     assert_eq!(lines[0], "hold 0 : 0 reckless");
     let foul = lines.iter().find(|line| line.contains("foul 1 by "));
@@ -105,8 +105,8 @@ fn penalties_of_a_game_add_up_to_its_points() {
 }
 
 #[test]
-fn positions_on_the_page_are_those_of_the_table() {
-    let (_, page) = drawn(&first_game(), "game.html", &[]);
+fn positions_on_the_page_are_near_the_table() {
+    let (_, page) = draw_to_new_file(&first_game(), "game.html", &[]);
     let (_, rest) = page.split_once("id=\"motion\">").unwrap();
     let (json, _) = rest.split_once("</script>").unwrap();
     let motion: Value = serde_json::from_str(json).unwrap();
@@ -137,14 +137,14 @@ fn archive_of_a_side_hides_the_other_sides_penalties() {
         assert_eq!(penalty["side"], 1, "{penalty}");
     }
     assert_eq!(summary["seed"], Value::Null);
-    let (_, page) = drawn(&first_game().join("side-1.zip"), "side.html", &[]);
+    let (_, page) = draw_to_new_file(&first_game().join("side-1.zip"), "side.html", &[]);
     assert!(page.contains("From the archive of side 1: "));
     assert!(page.contains("foul 1 by "));
 }
 
 #[test]
 fn picture_of_a_rally_is_well_formed() {
-    let (_, picture) = drawn(&first_game(), "rally.svg", &["--rally", "0"]);
+    let (_, picture) = draw_to_new_file(&first_game(), "rally.svg", &["--rally", "0"]);
     assert!(
         picture.contains("rally 0, 0:00.0 to 0:15.0: foul by "),
         "{picture:.600}"
@@ -165,7 +165,7 @@ fn picture_of_a_rally_is_well_formed() {
 
 #[test]
 fn game_of_a_series_is_named_by_its_number() {
-    let (stdout, _) = drawn(series(), "second.html", &["--game", "2"]);
+    let (stdout, _) = draw_to_new_file(series(), "second.html", &["--game", "2"]);
     assert!(stdout.starts_with("reckless 0 : 0 hold\n"), "{stdout}");
     let message = refusal(series(), &[]);
     assert!(

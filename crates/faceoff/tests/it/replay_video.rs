@@ -2,7 +2,7 @@
 
 use crate::{
     program::{command, faceoff, file_names, text},
-    replay::evaluated,
+    replay::scratch_with_evaluation,
     replay_game::first_game,
 };
 use serde_json::Value;
@@ -19,14 +19,14 @@ const SIZE: [usize; 2] = [960, 606];
 /// Frames of the last moment of a GIF.
 const FINAL_FRAMES: usize = 25;
 
-fn episode(file: &Path, options: &[&str]) -> Output {
-    let dataset = evaluated().join("out");
+fn write_episode_video(file: &Path, options: &[&str]) -> Output {
+    let dataset = scratch_with_evaluation().join("out");
     let fixed = ["replay", dataset.to_str().unwrap(), "--task", "hit"];
     let fixed = [&fixed[..], &["--episode", "0", "--video"]].concat();
     faceoff(&[&fixed[..], &[file.to_str().unwrap()], options].concat())
 }
 
-fn game(file: &Path, options: &[&str]) -> Output {
+fn write_game_video(file: &Path, options: &[&str]) -> Output {
     let recording = first_game();
     let fixed = ["replay", recording.to_str().unwrap(), "--video"];
     faceoff(&[&fixed[..], &[file.to_str().unwrap()], options].concat())
@@ -40,7 +40,7 @@ fn target(name: &str) -> (TempDir, PathBuf) {
 }
 
 #[track_caller]
-fn refused(output: &Output, words: &[&str]) {
+fn assert_refused(output: &Output, words: &[&str]) {
     let message = text(&output.stderr);
     assert!(!output.status.success(), "{}", text(&output.stdout));
     for word in words {
@@ -74,7 +74,7 @@ fn decode(file: &Path) -> Vec<Vec<u8>> {
 
 /// The control steps of the episode.
 fn episode_steps() -> usize {
-    let dataset = evaluated().join("out");
+    let dataset = scratch_with_evaluation().join("out");
     let list = ["dataset", "list", dataset.to_str().unwrap(), "--json"];
     let output = faceoff(&list);
     let rows: Vec<Value> = text(&output.stdout)
@@ -89,7 +89,7 @@ fn episode_steps() -> usize {
 #[test]
 fn video_of_an_episode_shows_all_of_it() {
     let (_dir, file) = target("look.gif");
-    let output = episode(&file, &["--speed", "4"]);
+    let output = write_episode_video(&file, &["--speed", "4"]);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let stdout = text(&output.stdout);
     assert!(stdout.starts_with("hit, episode 0 of "), "{stdout}");
@@ -108,7 +108,7 @@ fn video_of_an_episode_shows_all_of_it() {
 fn part_of_a_game_is_chosen_by_time_rally_and_speed() {
     let frames = |options: &[&str]| {
         let (_dir, file) = target("game.gif");
-        let output = game(&file, options);
+        let output = write_game_video(&file, options);
         assert!(output.status.success(), "{}", text(&output.stderr));
         decode(&file).len() - FINAL_FRAMES + 1
     };
@@ -124,7 +124,7 @@ fn part_of_a_game_is_chosen_by_time_rally_and_speed() {
 fn frames_are_numbered_in_an_empty_folder() {
     let (dir, folder) = target("frames/");
     let span = ["--from", "0", "--to", "0.1"];
-    let output = game(&folder, &span);
+    let output = write_game_video(&folder, &span);
     assert!(output.status.success(), "{}", text(&output.stderr));
     assert_eq!(
         file_names(&folder),
@@ -141,14 +141,14 @@ fn frames_are_numbered_in_an_empty_folder() {
         let size = [info.info().width, info.info().height];
         assert_eq!(size.map(|side| side as usize), SIZE);
     }
-    refused(
-        &game(&folder, &span),
+    assert_refused(
+        &write_game_video(&folder, &span),
         &["is not empty", "a new or an empty folder"],
     );
     let empty = dir.path().join("empty");
     fs::create_dir(&empty).unwrap();
     assert!(
-        game(&empty, &span).status.success(),
+        write_game_video(&empty, &span).status.success(),
         "it exists and is empty"
     );
     assert_eq!(file_names(&empty).len(), 4);
@@ -174,7 +174,7 @@ fn game_with_path(file: &Path, programs: &Path) -> Output {
 fn mpeg4_needs_ffmpeg_and_says_so() {
     let (dir, file) = target("game.mp4");
     let output = game_with_path(&file, dir.path());
-    refused(
+    assert_refused(
         &output,
         &["ffmpeg", "not installed", "apt install ffmpeg", "game.gif"],
     );
@@ -207,7 +207,7 @@ fn ffmpeg_gets_the_pixels_of_all_frames() {
     write_program(
         "for last; do :; done; echo half > \"${last#file:}\"; echo 'no such codec' >&2; exit 3",
     );
-    refused(
+    assert_refused(
         &game_with_path(&file, dir.path()),
         &["ffmpeg ended with", "no such codec"],
     );
@@ -219,7 +219,10 @@ fn ffmpeg_gets_the_pixels_of_all_frames() {
 #[test]
 fn unsuitable_video_is_refused_with_a_reason() {
     let (dir, file) = target("game.webm");
-    refused(&game(&file, &[]), &["ends in .gif or .mp4", "game.webm"]);
+    assert_refused(
+        &write_game_video(&file, &[]),
+        &["ends in .gif or .mp4", "game.webm"],
+    );
     let file = dir.path().join("game.gif");
     for (options, words) in [
         (
@@ -235,19 +238,19 @@ fn unsuitable_video_is_refused_with_a_reason() {
         ),
         (&["--rally", "0", "--from", "1"], &["cannot be used with"]),
     ] {
-        refused(&game(&file, options), words);
+        assert_refused(&write_game_video(&file, options), words);
         assert!(!file.exists(), "{options:?}");
     }
     let recording = first_game();
     let recording = recording.to_str().unwrap();
-    refused(&faceoff(&["replay", recording]), &["--out <FILE>"]);
+    assert_refused(&faceoff(&["replay", recording]), &["--out <FILE>"]);
     for (name, options, words) in [
         ("a.html", &["--from", "1"][..], "--out <FILE>"),
         ("a.gif", &[], "videos are written by --video"),
     ] {
         let file = dir.path().join(name);
         let fixed = ["replay", recording, "--out", file.to_str().unwrap()];
-        refused(&faceoff(&[&fixed[..], options].concat()), &[words]);
+        assert_refused(&faceoff(&[&fixed[..], options].concat()), &[words]);
         assert!(!file.exists(), "{name}");
     }
 }

@@ -2,7 +2,7 @@
 
 use super::season::{ALL_EVALUATIONS, DAYS, Season, date, local_time};
 use crate::site::{ADMIN, string};
-use faceoff_worker::start_due;
+use faceoff_worker::update_due_days;
 use serde_json::{Value, json};
 
 // The days of the actions, counted from 0.
@@ -222,7 +222,7 @@ impl Season {
         );
         self.site
             .set_time(local_time(day + 1, 18) - jiff::SignedDuration::from_millis(1));
-        start_due(
+        update_due_days(
             &self.site.store,
             &faceoff_airhockey::competition(),
             self.site.now(),
@@ -343,7 +343,7 @@ impl Season {
     /// After the last day: reveals the blind stage, signs off each stage, and closes the season.
     pub async fn sign_off(&mut self) {
         self.site.set_time(local_time(DAYS + 1, 12));
-        start_due(
+        update_due_days(
             &self.site.store,
             &faceoff_airhockey::competition(),
             self.site.now(),

@@ -3,7 +3,7 @@
 
 use super::fake_worker::FakeWorker;
 use crate::site::{ADMIN, Answer, GZIP, Site, TestTeam, string};
-use faceoff_worker::{clean_up, start_due};
+use faceoff_worker::{clean_up, update_due_days};
 use jiff::{SignedDuration, Timestamp, ToSpan, civil::Date, tz::TimeZone};
 use reqwest::Method;
 use serde_json::{Value, json};
@@ -191,7 +191,7 @@ impl Season {
             (local_time(day, 18), &json!(date(day)))
         );
         self.site.set_time(cutoff - SignedDuration::from_millis(1));
-        start_due(
+        update_due_days(
             &self.site.store,
             faceoff_airhockey::simulator().competition(),
             self.site.now(),
@@ -203,7 +203,7 @@ impl Season {
             return 0;
         }
         self.site.set_time(cutoff);
-        start_due(&self.site.store, &faceoff_airhockey::competition(), cutoff)
+        update_due_days(&self.site.store, &faceoff_airhockey::competition(), cutoff)
             .await
             .unwrap();
         let started = self.evaluations(day).await.len();

@@ -108,7 +108,7 @@ async fn latest_round(
     tournament: &Tournament,
     kind: DepartureKind,
 ) -> Result<RoundNumber> {
-    if tournament.rules.plays_on(kind) {
+    if tournament.rules.finishes_round(kind) {
         round_number(rounds::count(tx, tournament.id).await? + 1)
     } else {
         current_round(tx, tournament.id).await
@@ -228,7 +228,7 @@ pub(crate) async fn remove_entrant(
         reason: reason.clone(),
     };
     entrants::set_departure(tx, id, team, &departure).await?;
-    let played_until = tournament.rules.plays_on(kind).then_some(from_round);
+    let played_until = tournament.rules.finishes_round(kind).then_some(from_round);
     cancel_open_games(tx, id, team, played_until, &cancel_reason).await?;
     let event = Event::TeamLeftTournament {
         team,

@@ -79,7 +79,7 @@ async fn active_submission(
 async fn check_quota(tx: &mut Tx, tournament: &Tournament, team: TeamId) -> Result<()> {
     let today = start_of_utc_day(tx.now);
     let used = games::count_requested(tx, team, today).await?;
-    let limit = tournament.settings.free_games_per_day;
+    let limit = tournament.settings.test_and_friendly_games_per_day;
     if used >= limit {
         return Err(StoreError::GameQuotaExceeded { limit, used });
     }

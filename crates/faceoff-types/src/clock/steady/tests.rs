@@ -67,7 +67,7 @@ fn clock_without_steps_is_the_system_clock() {
 }
 
 #[test]
-fn step_is_held_until_the_clock_is_set_back() {
+fn step_is_reported_and_not_followed_until_set_back() {
     for by_ms in [5 * DAY_MS, -DAY_MS, 3001, -3001] {
         let machine = Machine::default();
         let clock = machine.clock(ClockStart::default());

@@ -31,8 +31,8 @@ fn immediate_retries() -> TransferTimeouts {
         retry_delay: Duration::ZERO,
         max_retry_delay: Duration::ZERO,
         // Independent of the speed of the machine.
-        stall: Duration::from_secs(3600),
-        unavailable: Duration::from_secs(3600),
+        stall_timeout: Duration::from_secs(3600),
+        retry_timeout: Duration::from_secs(3600),
         ..TransferTimeouts::default()
     }
 }
@@ -284,14 +284,14 @@ async fn upload_over_a_slow_link_needs_one_attempt() {
         let (mut connection, _) = accept(&listener).await;
         for _ in 0..PIECES {
             read_body(&mut connection, PIECE).await;
-            tokio::time::advance(transfer.timeouts.stall * 2 / 3).await;
+            tokio::time::advance(transfer.timeouts.stall_timeout * 2 / 3).await;
         }
         respond(connection, "204 No Content").await;
     };
     let stored = files.store(&transfer, "steps.parquet", &path, never_ends);
     let (stored, ()) = tokio::join!(stored, server);
     stored.unwrap();
-    assert!(started_at.elapsed() > transfer.timeouts.stall * 2);
+    assert!(started_at.elapsed() > transfer.timeouts.stall_timeout * 2);
     drop(test_running);
     assert!(blocking_task.await.unwrap().is_err());
 }

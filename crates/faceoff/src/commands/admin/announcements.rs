@@ -38,7 +38,7 @@ pub(super) enum AnnouncementAction {
     },
 }
 
-pub(super) async fn act(
+pub(super) async fn run_action(
     client: &Client,
     json: bool,
     action: AnnouncementAction,

@@ -84,7 +84,7 @@ fn read_operator_token(data_dir: Option<&Path>) -> anyhow::Result<String> {
     let file = data_dir.join(ADMIN_TOKEN_FILE);
     std::fs::read_to_string(&file).with_context(|| {
         NotSignedIn(format!(
-            "reading the organiser's token from {}; name the server's folder with --data-dir, sign in with faceoff login, or \
+            "reading the operator's token from {}; name the server's folder with --data-dir, sign in with faceoff login, or \
              give the token with --token or FACEOFF_ADMIN_TOKEN",
             file.display()
         ))

@@ -64,7 +64,11 @@ pub(super) enum DayAction {
     },
 }
 
-pub(super) async fn act(client: &Client, json: bool, action: DayAction) -> anyhow::Result<()> {
+pub(super) async fn run_action(
+    client: &Client,
+    json: bool,
+    action: DayAction,
+) -> anyhow::Result<()> {
     match action {
         DayAction::StartDay { stage } => {
             let stage = match stage {

@@ -52,7 +52,7 @@ pub(super) enum EvaluationAction {
     },
 }
 
-pub(super) async fn act(
+pub(super) async fn run_action(
     client: &Client,
     json: bool,
     action: EvaluationAction,

@@ -19,7 +19,7 @@ pub(super) async fn export(
         true => Edition::Public,
         false => Edition::Organiser,
     };
-    let (manifest, bytes) = client.season_archive(edition, file).await?;
+    let (manifest, bytes) = client.download_season_archive(edition, file).await?;
     let summary = json!({
         "file": file,
         "bytes": bytes,

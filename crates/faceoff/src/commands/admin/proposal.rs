@@ -77,7 +77,11 @@ pub(super) enum ProposalAction {
     },
 }
 
-pub(super) async fn act(client: &Client, json: bool, action: ProposalAction) -> anyhow::Result<()> {
+pub(super) async fn run_action(
+    client: &Client,
+    json: bool,
+    action: ProposalAction,
+) -> anyhow::Result<()> {
     let proposal_view = match action {
         ProposalAction::List => {
             let all = client.proposals().await?;
@@ -91,7 +95,7 @@ pub(super) async fn act(client: &Client, json: bool, action: ProposalAction) -> 
         } => {
             let stage = find_stage(client, &stage).await?;
             client
-                .trial(stage.id, &Trial { submission, reason })
+                .start_trial(stage.id, &Trial { submission, reason })
                 .await?
         }
         ProposalAction::Evaluation { evaluation, reason } => {

@@ -47,7 +47,11 @@ pub(super) enum ResultAction {
     },
 }
 
-pub(super) async fn act(client: &Client, json: bool, action: ResultAction) -> anyhow::Result<()> {
+pub(super) async fn run_action(
+    client: &Client,
+    json: bool,
+    action: ResultAction,
+) -> anyhow::Result<()> {
     match action {
         ResultAction::Evaluation(args) => show(client, json, &args).await,
         ResultAction::Submission { submission } => {

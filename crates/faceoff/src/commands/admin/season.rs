@@ -53,7 +53,11 @@ pub(super) enum ShowOrClose {
     },
 }
 
-pub(super) async fn act(client: &Client, json: bool, action: SeasonAction) -> anyhow::Result<()> {
+pub(super) async fn run_action(
+    client: &Client,
+    json: bool,
+    action: SeasonAction,
+) -> anyhow::Result<()> {
     let season = match action {
         SeasonAction::Pause { reason } => {
             client.pause(reason).await?;

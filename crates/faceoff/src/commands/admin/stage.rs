@@ -133,7 +133,11 @@ fn parse_time(text: &str, zone: &IanaTimeZone) -> anyhow::Result<Timestamp> {
         .timestamp())
 }
 
-pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> anyhow::Result<()> {
+pub(super) async fn run_action(
+    client: &Client,
+    json: bool,
+    action: StageAction,
+) -> anyhow::Result<()> {
     match action {
         StageAction::List => {
             let stages = client.stages().await?;
@@ -246,12 +250,12 @@ fn stage_text(stage: &StageView) -> String {
     let overrides = [
         (
             "limits ",
-            !rules.limits.is_none(),
+            !rules.limits.is_empty(),
             serde_json::to_string(&rules.limits),
         ),
         (
             "uploads",
-            !settings.uploads.is_none(),
+            !settings.uploads.is_empty(),
             serde_json::to_string(&settings.uploads),
         ),
     ];
@@ -294,7 +298,7 @@ fn stage_text(stage: &StageView) -> String {
         } else {
             "custom"
         },
-        settings.standings,
+        settings.counting_result,
         match settings.publishes {
             Publication::Never => "if the team publishes them",
             Publication::AtClose => "when the stage closes",

@@ -36,7 +36,11 @@ pub(super) enum StorageAction {
     },
 }
 
-pub(super) async fn act(client: &Client, json: bool, action: StorageAction) -> anyhow::Result<()> {
+pub(super) async fn run_action(
+    client: &Client,
+    json: bool,
+    action: StorageAction,
+) -> anyhow::Result<()> {
     match action {
         StorageAction::Storage => {
             let teams = client.storage().await?;

@@ -80,7 +80,11 @@ pub(super) enum TeamAction {
     Teams,
 }
 
-pub(super) async fn act(client: &Client, json: bool, action: TeamAction) -> anyhow::Result<()> {
+pub(super) async fn run_action(
+    client: &Client,
+    json: bool,
+    action: TeamAction,
+) -> anyhow::Result<()> {
     match action {
         TeamAction::RetireTeam { team, confirm } => {
             let id = find_team(client, &team).await?;

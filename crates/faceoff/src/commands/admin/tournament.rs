@@ -156,7 +156,7 @@ pub(super) enum TournamentAction {
     },
 }
 
-pub(super) async fn act(
+pub(super) async fn run_action(
     client: &Client,
     json: bool,
     action: TournamentAction,
@@ -169,7 +169,7 @@ pub(super) async fn act(
         TournamentAction::Test { tournament, teams } => {
             let id = find_tournament(client, &tournament).await?;
             let requested = client.request_test_games(id, teams).await?;
-            return print(json, &requested, games::requested_text);
+            return print(json, &requested, games::test_games_text);
         }
         TournamentAction::FreeGames(tournament) => {
             let id = tournament.find(client).await?;

@@ -28,7 +28,11 @@ pub(super) enum WorkerAction {
     },
 }
 
-pub(super) async fn act(client: &Client, json: bool, action: WorkerAction) -> anyhow::Result<()> {
+pub(super) async fn run_action(
+    client: &Client,
+    json: bool,
+    action: WorkerAction,
+) -> anyhow::Result<()> {
     match action {
         WorkerAction::List => {
             let workers = client.workers().await?;

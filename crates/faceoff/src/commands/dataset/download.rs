@@ -51,8 +51,10 @@ pub(in crate::commands) async fn download(
         bail!("the evaluation has no dataset: {}", evaluation.next);
     };
     print_download(json, async |bar| {
-        let published = dataset_blake3.as_deref();
-        client.download_dataset(id, file, published, bar).await
+        let expected_blake3 = dataset_blake3.as_deref();
+        client
+            .download_dataset(id, file, expected_blake3, bar)
+            .await
     })
     .await
 }

@@ -31,7 +31,7 @@ pub(super) struct Job {
 }
 
 /// Outcome of all shards together.
-pub(super) enum Verdict {
+pub(super) enum EvalOutcome {
     /// All episodes are finished, with no more faults than allowed.
     Finished {
         faults: Vec<AgentFault>,
@@ -39,15 +39,10 @@ pub(super) enum Verdict {
         outcomes: Vec<EpisodeOutcome>,
         logs: Logs,
     },
-    Failed {
-        faults: Vec<AgentFault>,
-        logs: Logs,
-    },
-    /// The agent's first start timed out, and none answered before.
-    NeverAnswered {
-        fault: AgentFault,
-        logs: Logs,
-    },
+    /// The agent had more faults than allowed.
+    Failed { faults: Vec<AgentFault>, logs: Logs },
+    /// A start of the agent timed out before any of its processes had answered.
+    NeverAnswered { fault: AgentFault, logs: Logs },
 }
 
 /// State that the worker threads share.
@@ -77,7 +72,7 @@ pub(super) fn run_shards(
     envs: &[AgentEnvironment],
     jobs: Vec<Job>,
     notes: Notes,
-) -> anyhow::Result<Verdict> {
+) -> anyhow::Result<EvalOutcome> {
     let episodes: u64 = jobs.iter().map(|job| job.spec.episodes.len() as u64).sum();
     let max_faults = jobs.first().map_or(0, |job| job.spec.max_faults);
     // The jobs are in the order of the tasks.
@@ -107,7 +102,7 @@ pub(super) fn run_shards(
     };
     let results: Vec<Result<(), PlatformFault>> = thread::scope(|scope| {
         let pool = &pool;
-        let _end = EndOfRun(pool);
+        let _guard = AnswerWaitGuard(pool);
         scope.spawn(move || {
             silence::explain(&["the agent"], &answers, |note| pool.print(note));
         });
@@ -153,14 +148,14 @@ pub(super) fn run_shards(
             .position(|fault| is_silent_start(&fault.fault))
     {
         let fault = faults.swap_remove(position);
-        return Ok(Verdict::NeverAnswered { fault, logs });
+        return Ok(EvalOutcome::NeverAnswered { fault, logs });
     }
     if faults.len() > max_faults as usize {
-        Ok(Verdict::Failed { faults, logs })
+        Ok(EvalOutcome::Failed { faults, logs })
     } else {
         let mut outcomes = into_inner(pool.outcomes);
         outcomes.sort_by_key(|outcome| (order(outcome.task), outcome.episode));
-        Ok(Verdict::Finished {
+        Ok(EvalOutcome::Finished {
             faults,
             outcomes,
             logs,
@@ -207,10 +202,10 @@ impl Pool {
     }
 }
 
-/// Ends the wait for the first answer with the run, also when a worker panics.
-struct EndOfRun<'a>(&'a Pool);
+/// Ends the wait for the first answer when the run ends, also if a worker panics.
+struct AnswerWaitGuard<'a>(&'a Pool);
 
-impl Drop for EndOfRun<'_> {
+impl Drop for AnswerWaitGuard<'_> {
     fn drop(&mut self) {
         self.0.end_wait_for_answer();
     }

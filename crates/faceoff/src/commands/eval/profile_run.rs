@@ -3,7 +3,7 @@
 use super::{
     files::{LOG, RESULTS, remove_earlier, write_json},
     logs::Logs,
-    pool::{Job, Verdict, run_shards},
+    pool::{EvalOutcome, Job, run_shards},
 };
 use crate::{
     commands::{notes::Notes, silence},
@@ -56,7 +56,7 @@ pub(super) fn run_profile(
     let jobs = jobs(setup, profile);
     let dirs: Vec<PathBuf> = jobs.iter().map(|job| job.out.clone()).collect();
     let (outcomes, faults) = match run_shards(&setup.bundle, &setup.envs, jobs, setup.notes)? {
-        Verdict::Finished {
+        EvalOutcome::Finished {
             faults,
             outcomes,
             logs,
@@ -70,7 +70,7 @@ pub(super) fn run_profile(
             }
             (outcomes, faults)
         }
-        Verdict::NeverAnswered { fault, logs } => {
+        EvalOutcome::NeverAnswered { fault, logs } => {
             let path = write_log(out, &logs)?;
             print_first_output(setup.notes, &fault, &logs);
             bail!(
@@ -79,7 +79,7 @@ pub(super) fn run_profile(
                 path.display()
             );
         }
-        Verdict::Failed { faults, logs } => {
+        EvalOutcome::Failed { faults, logs } => {
             let path = write_log(out, &logs)?;
             print_faults(setup.notes, &faults, &logs);
             let last = faults.last().map(ToString::to_string).unwrap_or_default();
@@ -151,7 +151,8 @@ fn jobs(setup: &EvalSetup, profile: Profile) -> Vec<Job> {
     jobs
 }
 
-/// Prints how often each fault happened that was printed once, and the agent's output before the first one.
+/// Prints how often each repeated fault occurred, since each kind was printed only once, and the agent's output before the first
+/// fault.
 fn print_faults(notes: Notes, faults: &[AgentFault], logs: &Logs) {
     let mut counts: Vec<(&AgentFault, u32)> = Vec::new();
     for fault in faults {

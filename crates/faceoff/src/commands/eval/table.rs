@@ -1,6 +1,8 @@
 //! Table of an evaluation's result by task. A *tier* is the class of an agent by its penalty points.
 
-use crate::commands::table_cells::{milliseconds, percent_interval, violation_heads, violations};
+use crate::commands::table_cells::{
+    computation_time_cell, percent_interval, violation_cells, violation_headings,
+};
 use faceoff_types::{EvaluationResult, Tier};
 
 /// The result as text. The columns from `ee` to `time` count the violations of each constraint: end effector, links, joint
@@ -24,7 +26,7 @@ pub(super) fn result_table(agent: &str, result: &EvaluationResult) -> String {
         "95 % interval",
         "penalty",
         tier_cell("tier"),
-        violation_heads(),
+        violation_headings(),
         "time mean/p99/max [ms]"
     ));
     for (task, task_result) in &result.tasks {
@@ -35,8 +37,8 @@ pub(super) fn result_table(agent: &str, result: &EvaluationResult) -> String {
             percent_interval(task_result.success_ci95),
             task_result.penalty_points,
             tier_cell(task_result.tier.map_or("", Tier::title)),
-            violations(&task_result.violations),
-            milliseconds(task_result.computation_time_s),
+            violation_cells(&task_result.violations),
+            computation_time_cell(task_result.computation_time_s),
         ));
     }
     lines.push(format!(

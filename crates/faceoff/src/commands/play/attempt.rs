@@ -20,7 +20,7 @@ pub(super) enum AttemptError {
     Silent(String),
 }
 
-/// A game to play; the home side changes within a series.
+/// One attempt at a game: its seed, which bundle is at home, and the output folder.
 pub(super) struct Attempt<'a> {
     pub(super) seed: Seed,
     /// The second bundle is at home.
@@ -29,14 +29,14 @@ pub(super) struct Attempt<'a> {
 }
 
 /// Plays the games between two agents, and knows which of them have answered.
-pub(super) struct Games<'a> {
+pub(super) struct GamePlayer<'a> {
     matchup: &'a Matchup,
     notes: Notes,
     /// Has each agent, in the sequence of the command line, answered in any game?
     has_answered: [bool; 2],
 }
 
-impl<'a> Games<'a> {
+impl<'a> GamePlayer<'a> {
     pub(super) const fn new(matchup: &'a Matchup, notes: Notes) -> Self {
         Self {
             matchup,

@@ -41,7 +41,7 @@ pub(super) struct PlayOptions {
     /// Run the agents without a sandbox, with your own environment
     #[arg(long)]
     pub(super) no_sandbox: bool,
-    /// A server's configuration, for limits, runtimes and given-up layers, and for the perturbations of [evaluation]
+    /// A server's configuration, for limits, runtimes, disabled layers of the sandbox, and the perturbations of [evaluation]
     #[arg(long, value_name = "FILE")]
     pub(super) config: Option<PathBuf>,
 }

@@ -1,7 +1,7 @@
 //! A series of games between the same two bundles.
 
 use super::{
-    attempt::{Attempt, AttemptError, Games},
+    attempt::{Attempt, AttemptError, GamePlayer},
     bar::Bar,
     matchup::Matchup,
     options::PlayOptions,
@@ -41,7 +41,7 @@ pub(super) fn play(
         agents: matchup.agents(),
         spec: matchup.spec(),
     };
-    let mut game_player = Games::new(matchup, Notes::beside(options.json));
+    let mut game_player = GamePlayer::new(matchup, Notes::beside(options.json));
     let mut games = Vec::new();
     let mut json = String::new();
     if !options.json {

@@ -1,7 +1,7 @@
 //! Tables of `faceoff play`: the result of a game, and of a series of games.
 
 use super::series_results::{SeriesGame, SeriesKind, SeriesResults};
-use crate::commands::table_cells::{milliseconds, violation_heads, violations};
+use crate::commands::table_cells::{computation_time_cell, violation_cells, violation_headings};
 use faceoff_scoring::tournament::GameScore;
 use faceoff_types::Side;
 use std::fmt::Write as _;
@@ -24,7 +24,7 @@ pub(super) fn game_table(game: &GameScore) -> String {
         "fouls",
         "penalty",
         "tier",
-        violation_heads(),
+        violation_headings(),
         "late",
         "faults",
         "time mean/p99/max [ms]"
@@ -38,10 +38,10 @@ pub(super) fn game_table(game: &GameScore) -> String {
             side.fouls,
             side.penalty_points,
             side.tier.title(),
-            violations(&side.violations),
+            violation_cells(&side.violations),
             side.late_answers,
             side.faults,
-            milliseconds(side.computation_time_s),
+            computation_time_cell(side.computation_time_s),
         ));
     }
     for (number, side) in (1..).zip(&game.sides) {

@@ -81,7 +81,7 @@ fn initial<const N: usize>(record: &EpisodeRecord, names: [&str; N]) -> anyhow::
 }
 
 impl EpisodeRecording {
-    /// Reads one episode of a dataset, and little else.
+    /// Reads one episode of a dataset without reading the steps of the others.
     pub fn read(path: &Path, task: Task, episode: u32) -> anyhow::Result<Self> {
         let dataset = Dataset::open_lazily(path, competition()).with_context(|| {
             format!("opening {} as the dataset of an evaluation", path.display())

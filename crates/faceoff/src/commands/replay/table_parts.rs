@@ -27,8 +27,8 @@ fn extent_m() -> [f64; 2] {
     [TABLE.half_length_m(), TABLE.half_width_m()].map(|half| 2.0 * (half + MARGIN_M))
 }
 
-/// An element with the visible part of the table, so far without the table.
-pub fn begin_above(width_px: u32, attributes: &str) -> String {
+/// Opens an SVG element that shows the area of the table, without drawing the table.
+pub fn begin_without_table(width_px: u32, attributes: &str) -> String {
     let [width, height] = extent_m();
     let (left, top) = (-width / 2.0, -height / 2.0);
     format!(
@@ -43,7 +43,7 @@ pub fn begin_above(width_px: u32, attributes: &str) -> String {
 pub fn begin(width_px: u32, attributes: &str) -> String {
     let (half_length, half_width) = (TABLE.half_length_m(), TABLE.half_width_m());
     let [surface, edge, middle, goal, _] = TABLE_COLOURS;
-    let mut out = begin_above(width_px, attributes);
+    let mut out = begin_without_table(width_px, attributes);
     let half_goal = TABLE.goal_width_m / 2.0;
     out += &format!(
         "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"{surface}\" stroke=\"{edge}\"/>\n\

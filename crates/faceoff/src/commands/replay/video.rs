@@ -17,8 +17,8 @@ use std::path::{Path, PathBuf};
 const FRAME_TIME_S: f64 = FRAME_TIME_CS as f64 / 100.0;
 /// Frames of the last moment, which stays for a second.
 const FINAL_FRAMES: usize = 25;
-/// Largest number of frames of each format, without those of the last moment. A GIF of a minute has some megabytes, and most
-/// programs show no longer one well; an MPEG-4 has room for a game of 15 minutes.
+/// Largest number of frames of each format, without the copies of the last frame. A GIF of one minute has some megabytes, and
+/// most programs show longer GIFs badly. The limit of MPEG-4 suffices for a game of 15 minutes.
 const MAX_GIF_FRAMES: usize = 1_500;
 const MAX_PNG_FRAMES: usize = 5_000;
 const MAX_MPEG4_FRAMES: usize = 30_000;

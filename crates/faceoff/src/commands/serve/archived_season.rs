@@ -2,7 +2,7 @@
 
 use super::{
     http::{serve_http, shutdown_signal},
-    resources::{ServerResources, announce},
+    resources::{ServerResources, print_address},
 };
 use crate::competition::competition;
 use crate::config::Config;
@@ -57,7 +57,7 @@ pub async fn serve(
         connections,
         shutdown.clone(),
     ));
-    announce(address);
+    print_address(address);
     let outcome = tokio::select! {
         name = signal => {
             tracing::info!(signal = name, "shutting down");

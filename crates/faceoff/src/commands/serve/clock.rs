@@ -19,7 +19,7 @@ use tokio_util::sync::CancellationToken;
 /// How often the clocks are compared without another reason to read them.
 const INTERVAL: Duration = Duration::from_secs(1);
 
-/// A change of the recorded time that is recorded again.
+/// Smaller changes of the zero time are not recorded again, and smaller changes of a clock step are not logged again.
 const MIN_CHANGE: SignedDuration = SignedDuration::from_secs(1);
 
 const FILE: &str = "clock.json";

@@ -183,9 +183,9 @@ fn load_or_create_operator_token(data_dir: &Path) -> anyhow::Result<[u8; 32]> {
         Err(error) => return Err(error).with_context(|| format!("reading {}", file.display())),
     }
     let token =
-        Secret::generate(SecretKind::Operator).context("generating the organiser's token")?;
+        Secret::generate(SecretKind::Operator).context("generating the operator's token")?;
     write_secret(&file, token.as_str())?;
-    tracing::info!(file = %file.display(), "created the organiser's token; keep the file secret");
+    tracing::info!(file = %file.display(), "created the operator's token; keep the file secret");
     Ok(token.hash())
 }
 
@@ -232,7 +232,11 @@ pub fn load_or_create_link_key(data_dir: &Path) -> anyhow::Result<LinkKey> {
 ///
 /// # Errors
 /// If the file or the database cannot be read or written.
-pub async fn set_admin_token(store: &Store, data_dir: &Path, now: Timestamp) -> anyhow::Result<()> {
+pub async fn register_operator_token(
+    store: &Store,
+    data_dir: &Path,
+    now: Timestamp,
+) -> anyhow::Result<()> {
     if !store
         .set_operator_token(load_or_create_operator_token(data_dir)?, now)
         .await?

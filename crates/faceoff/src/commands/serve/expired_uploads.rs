@@ -1,11 +1,11 @@
-//! Removes uploads in parts that no client continues, so that they do not occupy the disk.
+//! Removes partial uploads that no client continues, so that they do not occupy the disk.
 
 use faceoff_http::remove_expired_uploads;
 use faceoff_types::Clock;
 use std::{path::PathBuf, time::Duration};
 use tokio_util::sync::CancellationToken;
 
-/// Pause between two removals; uploads are kept for a day.
+/// Pause between two runs; a partial upload expires after a day.
 const INTERVAL: Duration = Duration::from_mins(10);
 
 /// Removes expired uploads now and from time to time, until the shutdown.

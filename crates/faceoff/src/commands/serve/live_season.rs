@@ -6,9 +6,9 @@ use super::{
     monitoring,
     priority::low_priority_runtime,
     remote,
-    resources::{ServerResources, announce},
+    resources::{ServerResources, print_address},
     runtime_inventory,
-    sandbox::hold_in_memory,
+    sandbox::copy_to_memory,
     tasks::ServerTasks,
 };
 use crate::competition::competition;
@@ -49,7 +49,7 @@ pub(super) fn run(config: Config, connections: ConnectionLimits) -> anyhow::Resu
     let service = thread::Builder::new()
         .name("service".to_owned())
         .spawn(move || {
-            let runtime = low_priority_runtime(&slots.cpus.service)?;
+            let runtime = low_priority_runtime(&slots.cpus.server)?;
             runtime.block_on(serve(config, connections, slots))
         })
         .context("starting the service thread")?;
@@ -96,8 +96,8 @@ async fn serve(
     };
     let router = faceoff_http::router(store.clone(), live.clone(), http_config.clone());
     let deliverer = webhook_deliverer(&config, &store, &clock)?;
-    // Kept as long as agents run.
-    let _image = hold_in_memory(&mut agent.runtimes, config.sandbox.resident_bytes);
+    // The runtimes' files in memory, kept as long as agents run.
+    let _memory_copy = copy_to_memory(&mut agent.runtimes, config.sandbox.resident_bytes);
     let workers = WorkerConfig {
         slots: SlotsConfig {
             cpus: slots.cpus,
@@ -117,7 +117,7 @@ async fn serve(
         %address,
         data_dir = %data_dir.display(),
         slots = workers.slots.cpus.slots.len(),
-        service_cpus = ?workers.slots.cpus.service,
+        service_cpus = ?workers.slots.cpus.server,
         "serving"
     );
 
@@ -158,7 +158,7 @@ async fn serve(
     let webhooks_enabled = config.webhooks.enabled;
     tasks.spawn(move |shutdown| deliver_webhooks(deliverer, webhooks_enabled, shutdown));
     tasks.spawn(|shutdown| serve_http(resources.listener, router, connections, shutdown));
-    announce(address);
+    print_address(address);
     tasks.run_until_signal(&store).await
 }
 

@@ -4,9 +4,9 @@ use anyhow::Context;
 use faceoff_sandbox::affinity;
 use tokio::runtime::{Builder, Runtime};
 
-/// An async runtime whose threads have a lower priority than slots, as the calling thread gets. Threads inherit the priority of
-/// the thread that starts them, usually this one. A thread that the runtime starts for a slot lowers its own priority; a database
-/// connection that a slot opens keeps the slot's.
+/// An async runtime whose threads have a lower priority than slots. Also lowers the priority of the calling thread, because threads
+/// inherit the priority of the thread that starts them, usually this one. A thread that the runtime starts for a slot lowers its
+/// own priority; a database connection that a slot opens keeps the slot's.
 ///
 /// # Errors
 /// If the runtime cannot be started.

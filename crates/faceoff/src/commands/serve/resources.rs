@@ -4,7 +4,8 @@
 use super::{
     clock::server_clock,
     data_folder::{
-        close_to_others, empty_folder_except, load_or_create_link_key, lock, set_admin_token,
+        close_to_others, empty_folder_except, load_or_create_link_key, lock,
+        register_operator_token,
     },
     downloads::downloads,
 };
@@ -50,7 +51,7 @@ impl ServerResources {
         let lock = lock(data_dir)?;
         let upload_dir = data_dir.join("uploads");
         // A process that was killed may have left half-uploaded files, which belong to no submission, or an archive that a
-        // visitor was downloading. Uploads in parts go on after a restart.
+        // visitor was downloading. Partial uploads continue after a restart.
         empty_folder_except(&upload_dir, PARTIAL_UPLOADS_FOLDER)?;
         let store = open_store(data_dir)
             .await?
@@ -63,7 +64,7 @@ impl ServerResources {
         checked.map_err(|problem| anyhow!("the competition of this program: {problem}"))?;
         let bound = store.bind_competition(competition(), clock.now()).await;
         bound.with_context(|| format!("opening the data folder {}", data_dir.display()))?;
-        set_admin_token(&store, data_dir, clock.now()).await?;
+        register_operator_token(&store, data_dir, clock.now()).await?;
         let listen = config.server.listen;
         let listener = TcpListener::bind(listen).await.with_context(|| {
             format!("listening on {listen}; choose another address with --listen")
@@ -115,6 +116,6 @@ async fn open_store(data_dir: &Path) -> anyhow::Result<Store> {
 
 /// Prints the address, including a port that the system has chosen, once connections are accepted, so that the parent process
 /// can read it. A closed standard output is no error.
-pub(super) fn announce(address: SocketAddr) {
+pub(super) fn print_address(address: SocketAddr) {
     let _ = writeln!(std::io::stdout(), "http://{address}");
 }

@@ -1,19 +1,19 @@
 //! The sandbox of agents on this host: which of its layers the host has, and a copy of the runtimes' files in memory.
 
 use anyhow::bail;
-use faceoff_sandbox::{HostFeature, Layer, MemoryImage, Runtime};
+use faceoff_sandbox::{Layer, LayerProbe, MemoryImage, Runtime};
 use std::collections::BTreeMap;
 
 /// Refuses a host that lacks a *layer* (one protection) of the sandbox which the configuration does not give up.
-pub fn check_sandbox(features: &[HostFeature], given_up: &[Layer]) -> anyhow::Result<()> {
+pub fn check_sandbox(features: &[LayerProbe], given_up: &[Layer]) -> anyhow::Result<()> {
     let mut missing = Vec::new();
     for feature in features.iter().filter(|feature| !feature.available) {
         if given_up.contains(&feature.layer) {
             tracing::warn!(layer = ?feature.layer, found = feature.found, "sandbox layer given up by configuration");
         } else {
-            let cure = feature.cure.as_deref().unwrap_or("not known for this host");
+            let fix = feature.fix.as_deref().unwrap_or("not known for this host");
             missing.push(format!(
-                "{}: {}\n    fix: {cure}",
+                "{}: {}\n    fix: {fix}",
                 layer_name(feature.layer),
                 feature.found
             ));
@@ -30,8 +30,8 @@ pub fn check_sandbox(features: &[HostFeature], given_up: &[Layer]) -> anyhow::Re
     )
 }
 
-/// Lets agents use a copy of the runtimes' files in memory, if it fits.
-pub fn hold_in_memory(
+/// Copies the runtimes' files to memory for agents, if they fit. Returns the guard of the copy.
+pub fn copy_to_memory(
     runtimes: &mut BTreeMap<String, Runtime>,
     limit_bytes: u64,
 ) -> Option<MemoryImage> {
@@ -64,12 +64,12 @@ fn layer_name(layer: Layer) -> String {
 mod tests {
     use super::*;
 
-    fn feature(layer: Layer, available: bool) -> HostFeature {
-        HostFeature {
+    fn feature(layer: Layer, available: bool) -> LayerProbe {
+        LayerProbe {
             layer,
             available,
             found: "no memory controller".into(),
-            cure: Some("enable it".into()),
+            fix: Some("enable it".into()),
         }
     }
 

@@ -164,7 +164,7 @@ pub(in crate::commands) fn attempts_text(attempts: &[GameAttemptView]) -> String
 }
 
 /// The requested test games, and the teams without one.
-pub(in crate::commands) fn requested_text(view: &TestGamesView) -> String {
+pub(in crate::commands) fn test_games_text(view: &TestGamesView) -> String {
     let mut text = games_table(&view.queued);
     for team in &view.skipped {
         text.push_str(&format!("\n{}: none, {}", team.team_name, team.reason));

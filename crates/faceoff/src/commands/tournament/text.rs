@@ -56,7 +56,7 @@ pub(in crate::commands) fn tournament_text(tournament: &TournamentView) -> Strin
         format!("  rules     {}", rules_text(&tournament.rules)),
         format!(
             "  settings  up to {} friendly and test games per team and day; recordings {}",
-            settings.free_games_per_day,
+            settings.test_and_friendly_games_per_day,
             match settings.publishes {
                 Publication::Never => "not public",
                 Publication::AtClose => "public when the tournament is closed",

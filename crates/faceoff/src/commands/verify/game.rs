@@ -70,7 +70,7 @@ pub(super) fn describe(path: &Path, simulated: &SimulatedGame) -> String {
         let limits = &result.limits;
         format!(
             "; with custom limits: answers accepted up to {} s, {} faults allowed, {} s in total",
-            limits.in_time_s, limits.max_faults, limits.total_s
+            limits.max_answer_s, limits.max_faults, limits.total_s
         )
     };
     format!(
@@ -87,7 +87,7 @@ pub(super) fn describe(path: &Path, simulated: &SimulatedGame) -> String {
 }
 
 /// Refuses `--secret` for a game.
-pub(super) fn refuse_season(has_secret: bool) -> Result<(), Failure> {
+pub(super) fn refuse_secret(has_secret: bool) -> Result<(), Failure> {
     if has_secret {
         return Err(Failure::from(DatasetError::Foreign(
             "--secret checks the seeds of an evaluation; leave it out for a game".to_owned(),

@@ -7,8 +7,8 @@ use serde_json::{Value, json};
 /// Positions are rounded to a millimetre, half a pixel of the picture.
 const PER_METRE: f64 = 1e3;
 
-/// Positions (mm) as differences from sample to sample, which have few digits; the samples and the score of each rally; and the samples
-/// with a violation of each side, as first and last of each span.
+/// The positions (mm) as differences between consecutive samples, which have few digits; for each rally, its first and last sample
+/// and the score before it; and for each side, the spans of samples with a violation, each as first and last sample.
 pub fn json(game: &RecordedGame) -> Value {
     let column = |value: &dyn Fn(usize) -> f64| -> Vec<i64> {
         let mut previous = 0;

@@ -52,7 +52,7 @@ fn violations(course: &SideCourse, start: u32) -> impl Iterator<Item = (u32, f64
         .into_iter()
         .zip(CONSTRAINTS)
         .filter_map(move |(name, (title, points, unit))| {
-            let here = || {
+            let in_window = || {
                 course.violations.iter().filter(|violation| {
                     let Violation {
                         samples: [from, to],
@@ -61,14 +61,16 @@ fn violations(course: &SideCourse, start: u32) -> impl Iterator<Item = (u32, f64
                     violation.name == name && from <= samples.end() && to >= samples.start()
                 })
             };
-            let first = here().next()?.samples[0].max(*samples.start());
-            let steps: u32 = here()
+            let first = in_window().next()?.samples[0].max(*samples.start());
+            let steps: u32 = in_window()
                 .map(|violation| {
                     let [from, to] = violation.samples;
                     to.min(*samples.end()) - from.max(*samples.start()) + 1
                 })
                 .sum();
-            let max_excess = here().map(|violation| violation.max_excess).fold(0.0, f64::max);
+            let worst = in_window()
+                .map(|violation| violation.max_excess)
+                .fold(0.0, f64::max);
             let cause = format!(
                 "{title} limit violated in {steps} control steps of {}, by up to {max_excess:.4} {unit}",
                 window_text(start)
@@ -94,17 +96,22 @@ fn window_text(start: u32) -> String {
 /// The names of [`CONSTRAINTS`], in their order.
 const NAMES: [ViolationName; 4] = [JOINT_POS, JOINT_VEL, EE, LINK];
 
-/// The points for faults or for computation time in a window, which replace each other.
+/// The points of a window for agent faults or for computation time. A window with an agent fault gets no points for computation
+/// time.
 fn time_or_fault(course: &SideCourse, window: usize, start: u32) -> Option<(u32, f64, String)> {
-    let played = &course.outcome.windows[window];
-    if played.faults > 0 {
+    let window_outcome = &course.outcome.windows[window];
+    if window_outcome.faults > 0 {
         let steps = start..start + WINDOW_STEPS;
         let first = course.outcome.faults.iter().map(|fault| fault.game_step);
         let step = first.filter(|step| steps.contains(step)).min();
-        let cause = format!("agent faults in {}: {}", window_text(start), played.faults);
+        let cause = format!(
+            "agent faults in {}: {}",
+            window_text(start),
+            window_outcome.faults
+        );
         return Some((step.unwrap_or(start), COMPUTATION_TIME_MAX_POINTS, cause));
     }
-    let time = &played.computation_time;
+    let time = &window_outcome.computation_time;
     let points = computation_time_penalty(time);
     (points > 0.0).then(|| {
         let cause = format!(

@@ -6,13 +6,13 @@ use faceoff_dataset::game::{GameCourse, GamePositions, ListedRally};
 use faceoff_types::{Side, escape_unprintable};
 use std::path::Path;
 
-/// Mallets before the first control step, which no table has: near their ends of the table, m.
+/// Positions of the mallets before the first control step, which are not recorded: near each side's end of the table, m.
 const INITIAL_MALLETS: [[f64; 2]; 2] = [[-0.8, 0.0], [0.8, 0.0]];
 
 /// A recorded game.
 pub struct RecordedGame {
     pub course: GameCourse,
-    /// How the sides are called: by their agents' names, which a number follows if both are the same.
+    /// The displayed names of the sides: their agents' names, followed by the side's number if both names are equal.
     pub agents: [String; 2],
     /// The positions after 0, 1, 2 … control steps.
     pub samples: Vec<GamePositions>,

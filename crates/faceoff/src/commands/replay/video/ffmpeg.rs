@@ -19,7 +19,7 @@ use std::{
 /// Longest time in which ffmpeg reads nothing, and in which it completes the file. It encodes many frames per second: the rest is
 /// for slow disks and busy machines.
 const TIMEOUT: Duration = Duration::from_secs(120);
-/// Longest wait for its errors after it has ended: a process that it started may still have them open.
+/// Longest wait for ffmpeg's error output after ffmpeg has ended: a child process of ffmpeg may still hold the pipe open.
 const MESSAGE_TIMEOUT: Duration = Duration::from_secs(10);
 /// Its errors are read to their end, and this much of them is stored.
 const MAX_MESSAGE_BYTES: usize = 4096;
@@ -48,7 +48,7 @@ impl Ffmpeg {
             .arg(format!("{width}x{height}"))
             .args(["-framerate", &rate.to_string(), "-i", "-", "-an"])
             .args(["-pix_fmt", "yuv420p", "-movflags", "+faststart"])
-            // The name of the file does not say it.
+            // The name of the temporary file does not tell ffmpeg the format.
             .args(["-f", "mp4"])
             .arg(target);
         match Self::spawn(&mut command, TIMEOUT) {
@@ -85,7 +85,9 @@ impl Ffmpeg {
             };
             match input.write(pixels) {
                 Ok(count) => pixels = &pixels[count..],
-                Err(error) if error.kind() == ErrorKind::WouldBlock => self.wait_for_reading()?,
+                Err(error) if error.kind() == ErrorKind::WouldBlock => {
+                    self.wait_until_writable()?
+                }
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Err(_) => {
                     // Its message says more than the broken pipe.
@@ -97,8 +99,8 @@ impl Ffmpeg {
         Ok(())
     }
 
-    /// Waits until it has read some pixels, or has ended.
-    fn wait_for_reading(&self) -> anyhow::Result<()> {
+    /// Waits until ffmpeg accepts further pixels, or has ended.
+    fn wait_until_writable(&self) -> anyhow::Result<()> {
         let Some(input) = &self.process.stdin else {
             return Ok(());
         };

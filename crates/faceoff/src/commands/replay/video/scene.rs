@@ -10,12 +10,12 @@ const WIDTH_PX: u32 = 960;
 /// Height of the caption above the table.
 const CAPTION_PX: u32 = 64;
 const MARGIN_PX: f64 = 24.0;
-const GROUND: &str = "#fff";
+const BACKGROUND: &str = "#fff";
 /// Samples of the puck's trail: a second.
 const TRAIL_SAMPLES: usize = 50;
 
-const CAPTION: TextStyle = TextStyle::new(Weight::Semibold, 30.0, TABLE_COLOURS[1]);
-const TIME: TextStyle = TextStyle::new(Weight::Regular, 30.0, TABLE_COLOURS[1]);
+const CAPTION_STYLE: TextStyle = TextStyle::new(Weight::Semibold, 30.0, TABLE_COLOURS[1]);
+const TIME_STYLE: TextStyle = TextStyle::new(Weight::Regular, 30.0, TABLE_COLOURS[1]);
 
 /// Positions of the bodies after a control step: x, y, m, table frame.
 #[derive(Debug, Clone, Copy)]
@@ -42,7 +42,7 @@ pub struct Scene {
 
 /// The colours of a video.
 pub fn colours() -> Vec<[u8; 3]> {
-    let all = [GROUND].into_iter().chain(TABLE_COLOURS);
+    let all = [BACKGROUND].into_iter().chain(TABLE_COLOURS);
     let all = all.chain(PATH_COLOURS).chain(DISC_COLOURS);
     all.map(rgb).collect()
 }
@@ -71,8 +71,8 @@ impl Scene {
     pub fn backdrop(&self) -> Result<Picture, PictureError> {
         // Encoders of videos take even heights only.
         let height = (f64::from(CAPTION_PX) + height_px(WIDTH_PX)) as u32;
-        let mut drawing = Drawing::new(WIDTH_PX, height.next_multiple_of(2), GROUND);
-        drawing.elements(&table_parts::begin(WIDTH_PX, &place()));
+        let mut drawing = Drawing::new(WIDTH_PX, height.next_multiple_of(2), BACKGROUND);
+        drawing.elements(&table_parts::begin(WIDTH_PX, &table_position()));
         drawing.elements(&self.underlay);
         drawing.elements(table_parts::END);
         Picture::draw(&drawing)
@@ -86,10 +86,10 @@ impl Scene {
         let baseline = f64::from(CAPTION_PX) - 22.0;
         let time = (self.clock)(sample);
         let right = f64::from(WIDTH_PX) - MARGIN_PX;
-        drawing.text(&time, &TIME, [right, baseline], Align::Right);
-        let room = right - MARGIN_PX - TIME.width_px("00:00.00 s");
-        let caption = CAPTION.truncated(self.caption(sample), room);
-        drawing.text(&caption, &CAPTION, [MARGIN_PX, baseline], Align::Left);
+        drawing.text(&time, &TIME_STYLE, [right, baseline], Align::Right);
+        let caption_width = right - MARGIN_PX - TIME_STYLE.width_px("00:00.00 s");
+        let caption = CAPTION_STYLE.truncated(self.caption(sample), caption_width);
+        drawing.text(&caption, &CAPTION_STYLE, [MARGIN_PX, baseline], Align::Left);
         drawing.elements(&self.bodies(sample));
         frame.draw_over(&drawing)?;
         Ok(frame)
@@ -112,7 +112,7 @@ impl Scene {
             .iter()
             .map(|sample| sample.puck)
             .collect();
-        let mut out = table_parts::begin_above(WIDTH_PX, &place());
+        let mut out = table_parts::begin_without_table(WIDTH_PX, &table_position());
         let [.., puck_path] = PATH_COLOURS;
         out += &path(
             &trail,
@@ -130,8 +130,8 @@ impl Scene {
     }
 }
 
-/// Where the table is in a frame.
-fn place() -> String {
+/// The SVG attribute that puts the table below the caption.
+fn table_position() -> String {
     format!("y=\"{CAPTION_PX}\"")
 }
 
