@@ -221,7 +221,7 @@ fn container_without_privileges_evaluates_own_agents() {
 }
 
 #[test]
-fn doctor_names_the_cure_of_an_old_bubblewrap() {
+fn doctor_names_the_fix_of_an_old_bubblewrap() {
     let home = Home::create();
     let old = home.folder.path().join("bwrap");
     let script =

@@ -96,7 +96,7 @@ impl Bubblewrap {
         }
         let found = BubblewrapProgram::find().map_err(|problem| SandboxError::Unavailable {
             layer: Layer::Namespaces,
-            reason: format!("{problem}; {}", problem.cure()),
+            reason: format!("{problem}; {}", problem.fix()),
         })?;
         Ok(FOUND.get_or_init(|| Self {
             program: found.path,

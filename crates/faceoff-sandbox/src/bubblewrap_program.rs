@@ -52,7 +52,7 @@ pub(crate) enum BubblewrapProblem {
 
 impl BubblewrapProblem {
     /// What to do about it.
-    pub(crate) fn cure(&self) -> String {
+    pub(crate) fn fix(&self) -> String {
         match self {
             Self::Missing => {
                 "install bubblewrap 0.8 or newer; on Debian: apt-get install bubblewrap".to_owned()
@@ -172,7 +172,7 @@ mod tests {
         let found = BubblewrapProgram::find_among(candidates(system, path));
         found
             .map(|program| program.path)
-            .map_err(|problem| format!("{problem}; {}", problem.cure()))
+            .map_err(|problem| format!("{problem}; {}", problem.fix()))
     }
 
     #[test]
@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn cure_of_an_unusable_bubblewrap_fits_its_cause() {
+    fn fix_of_an_unusable_bubblewrap_fits_its_cause() {
         let empty = tempfile::tempdir().unwrap();
         let error = find(&empty, None).unwrap_err();
         assert!(error.contains("apt-get install bubblewrap"), "{error}");

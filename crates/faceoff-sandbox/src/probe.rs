@@ -2,7 +2,7 @@
 
 use crate::{
     AgentProcess, Isolation, Layer, Limits, ReadLine, Runtime, SandboxError, SpawnError, SpawnSpec,
-    answered_calls, bubblewrap::Bubblewrap, bubblewrap_program::BubblewrapProgram, cures::cure,
+    answered_calls, bubblewrap::Bubblewrap, bubblewrap_program::BubblewrapProgram, fixes::fix,
 };
 use serde::Serialize;
 use std::{
@@ -28,7 +28,8 @@ pub struct HostFeature {
     /// The found feature, or the error.
     pub found: String,
     /// The fix: how to provide the layer, as a command if possible; `None` if it is available.
-    pub cure: Option<String>,
+    #[serde(rename = "cure")]
+    pub fix: Option<String>,
 }
 
 /// Probes the host: starts a process for each layer. Used by `doctor` and at start-up.
@@ -66,12 +67,12 @@ fn probe(layer: Layer) -> HostFeature {
             layer,
             available: true,
             found,
-            cure: None,
+            fix: None,
         },
         Err(error) => HostFeature {
             layer,
             available: false,
-            cure: Some(cure(layer, &error)),
+            fix: Some(fix(layer, &error)),
             found: error,
         },
     }
@@ -84,7 +85,7 @@ fn field<'a>(text: &'a str, name: &str) -> Option<&'a str> {
 }
 
 fn probe_namespaces() -> Result<String, String> {
-    // Its cure is reported separately.
+    // Its fix is reported separately.
     BubblewrapProgram::find().map_err(|problem| problem.to_string())?;
     let bubblewrap = Bubblewrap::find().map_err(|error| error.to_string())?;
     // Inside, the process is the second one, has no capabilities, and sees only its own network.

@@ -12,7 +12,7 @@ fn probe_covers_every_layer_and_names_fixes() {
     for feature in &features {
         println!("{feature:?}");
         assert!(!feature.found.is_empty());
-        assert_eq!(feature.cure.is_some(), !feature.available);
+        assert_eq!(feature.fix.is_some(), !feature.available);
     }
     // Fails if a layer is missing for root, or one that an ordinary user should have.
     missing_layers();

@@ -1,7 +1,7 @@
 //! `faceoff doctor`: checks what a host offers to agents and their sandbox, and how to fix what is missing.
 //!
 //! A *layer* is one protection of the sandbox, e.g. the memory limit. The configuration may *give up* layers: agents then run
-//! without them. Each report says what was `found` and, as its `cure`, how to fix a problem.
+//! without them. Each report says what was `found` and, as its `fix`, how to fix a problem.
 
 mod check;
 mod clock;
@@ -64,7 +64,8 @@ struct DiskReport {
     /// `None`: the disk cannot be queried.
     free_bytes: Option<u64>,
     found: String,
-    cure: Option<String>,
+    #[serde(rename = "cure")]
+    fix: Option<String>,
 }
 
 /// How `serve` would divide the file descriptors of this shell.
@@ -73,7 +74,8 @@ struct DescriptorReport {
     /// `None`: there are too few.
     divided: Option<Descriptors>,
     found: String,
-    cure: Option<String>,
+    #[serde(rename = "cure")]
+    fix: Option<String>,
 }
 
 /// Whether the runtimes' files are held in memory, where their timing does not reveal what other agents have read.
@@ -81,7 +83,8 @@ struct DescriptorReport {
 struct MemoryReport {
     available: bool,
     found: String,
-    cure: Option<String>,
+    #[serde(rename = "cure")]
+    fix: Option<String>,
 }
 
 #[derive(Debug, Serialize)]
@@ -180,14 +183,14 @@ fn memory_report(config: &Config) -> MemoryReport {
                 "{} MiB of runtime files are held in memory while serving",
                 bytes >> 20
             ),
-            cure: None,
+            fix: None,
         },
         Err(error) => MemoryReport {
             available: false,
             found: format!(
                 "{error}: without that, an agent can infer which files others have read"
             ),
-            cure: Some(match error {
+            fix: Some(match error {
                 MemoryImageError::NotEnoughMemory { bytes, .. } => {
                     let mib = (bytes >> 20).next_multiple_of(100) + 100;
                     format!(
@@ -235,7 +238,7 @@ fn descriptor_report(config: &Config) -> DescriptorReport {
                 connections,
                 per_address,
             } = divided;
-            let cure = (connections < limits.open).then(|| {
+            let fix = (connections < limits.open).then(|| {
                 format!(
                     "to allow all {} connections of connections.most, raise the limit: ulimit -n, or LimitNOFILE= of systemd",
                     limits.open
@@ -247,13 +250,13 @@ fn descriptor_report(config: &Config) -> DescriptorReport {
                     "at most {limit}, of which {reserved} for evaluations: {connections} connections, \
                     {per_address} per address"
                 ),
-                cure,
+                fix,
             }
         }
         Err(error) => DescriptorReport {
             divided: None,
             found: error.to_string(),
-            cure: None,
+            fix: None,
         },
     }
 }
@@ -285,12 +288,12 @@ fn disk_report(folder: PathBuf, min_free_bytes: u64) -> DiskReport {
             folder,
             free_bytes: None,
             found: "its disk cannot be queried".into(),
-            cure: Some("correct data_dir and scratch_dir of the configuration".into()),
+            fix: Some("correct data_dir and scratch_dir of the configuration".into()),
         };
     };
     let free_bytes = disk.f_bavail.saturating_mul(disk.f_frsize);
     let free_space = FreeSpace::new(vec![existing.to_owned()], min_free_bytes);
-    let cure = free_space.is_short().then(|| {
+    let fix = free_space.is_short().then(|| {
         "the queue would pause and uploads would be refused: free disk space, or lower server.min_free_bytes"
             .to_owned()
     });
@@ -302,7 +305,7 @@ fn disk_report(folder: PathBuf, min_free_bytes: u64) -> DiskReport {
             free_bytes >> 20,
             min_free_bytes >> 20
         ),
-        cure,
+        fix,
     }
 }
 
@@ -315,7 +318,7 @@ mod tests {
             layer: Layer::CgroupMemory,
             available,
             found: "no memory controller".into(),
-            cure: (!available).then(|| "enable it".into()),
+            fix: (!available).then(|| "enable it".into()),
         };
         Findings {
             ok: available || given_up,
@@ -331,17 +334,17 @@ mod tests {
     }
 
     #[test]
-    fn full_disk_is_reported_with_its_cure() {
+    fn full_disk_is_reported_with_its_fix() {
         let folder = std::env::temp_dir().join("not/yet/made");
         let ample = disk_report(folder.clone(), 1);
         assert!(
-            ample.free_bytes.is_some() && ample.cure.is_none(),
+            ample.free_bytes.is_some() && ample.fix.is_none(),
             "{ample:?}"
         );
         let full = disk_report(folder, u64::MAX);
         assert_eq!(full.free_bytes.is_some(), ample.free_bytes.is_some());
         assert!(
-            full.cure
+            full.fix
                 .expect("it is full")
                 .contains("server.min_free_bytes")
         );
@@ -362,7 +365,7 @@ mod tests {
             "{text}"
         );
         assert!(text.contains("-> enable it"), "{text}");
-        // A cure of several layers is printed once.
+        // A fix of several layers is printed once.
         let mut several = findings(false, false);
         several.features.extend(found.features);
         let mut text = Vec::new();

@@ -209,7 +209,7 @@ fn several_seeds_are_evaluated_and_pooled() {
 }
 
 #[test]
-fn missing_runtime_is_reported_once_with_its_cure() {
+fn missing_runtime_is_reported_once_with_its_fix() {
     let dir = tempfile::tempdir().unwrap();
     let bundle = dir.path().join("bundle");
     fs::create_dir(&bundle).unwrap();

@@ -2,10 +2,11 @@
 
 use serde::Serialize;
 
-/// The result of a check: `cure` says how to fix a problem, and is `None` if there is none.
+/// The result of a check: `fix` says how to fix a problem, and is `None` if there is none.
 #[derive(Debug, PartialEq, Eq, Serialize)]
 pub struct Check {
     pub name: &'static str,
     pub found: String,
-    pub cure: Option<String>,
+    #[serde(rename = "cure")]
+    pub fix: Option<String>,
 }

@@ -23,7 +23,7 @@ pub fn clock(data_dir: &Path, now: Timestamp) -> Check {
         return Check {
             name: "clock",
             found: format!("{now:.0} is before the last change of the database, {newest:.0}"),
-            cure: Some(
+            fix: Some(
                 "set the clock: until it has caught up, evaluation days start at the wrong time or not at all".to_owned(),
             ),
         };
@@ -32,7 +32,7 @@ pub fn clock(data_dir: &Path, now: Timestamp) -> Check {
 }
 
 fn clock_check(now: Timestamp, synchronised: Option<bool>) -> Check {
-    let (found, cure) = match synchronised {
+    let (found, fix) = match synchronised {
         Some(true) => ("synchronised with network time", None),
         Some(false) => (
             "not synchronised with network time",
@@ -43,7 +43,7 @@ fn clock_check(now: Timestamp, synchronised: Option<bool>) -> Check {
     Check {
         name: "clock",
         found: format!("{now:.0}, {found}"),
-        cure: cure.map(str::to_owned),
+        fix: fix.map(str::to_owned),
     }
 }
 
@@ -71,7 +71,7 @@ pub fn zone(zone: &IanaTimeZone, now: Timestamp) -> Check {
             "evaluation.zone is {zone}, local time {}",
             local.strftime("%Y-%m-%d %H:%M:%S (UTC%:z)")
         ),
-        cure: None,
+        fix: None,
     }
 }
 
@@ -92,20 +92,20 @@ mod tests {
             behind.found.contains("before the last change"),
             "{behind:?}"
         );
-        assert!(behind.cure.is_some());
+        assert!(behind.fix.is_some());
         assert!(!clock(folder.path(), now + hour).found.contains("before"));
     }
 
     #[test]
-    fn unsynchronised_clock_has_a_cure() {
+    fn unsynchronised_clock_has_a_fix() {
         let now = Timestamp::UNIX_EPOCH;
         assert!(
             clock_check(now, Some(false))
-                .cure
+                .fix
                 .unwrap()
                 .contains("set-ntp")
         );
-        assert_eq!(clock_check(now, Some(true)).cure, None);
-        assert_eq!(clock_check(now, None).cure, None);
+        assert_eq!(clock_check(now, Some(true)).fix, None);
+        assert_eq!(clock_check(now, None).fix, None);
     }
 }

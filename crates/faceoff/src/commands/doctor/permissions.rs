@@ -42,18 +42,18 @@ pub fn permissions(data_dir: &Path) -> Check {
         return Check {
             name: "permissions",
             found,
-            cure: None,
+            fix: None,
         };
     }
-    let (found, cures): (Vec<_>, Vec<_>) = problems.into_iter().unzip();
+    let (found, fixes): (Vec<_>, Vec<_>) = problems.into_iter().unzip();
     Check {
         name: "permissions",
         found: found.join("; "),
-        cure: Some(cures.join("; ")),
+        fix: Some(fixes.join("; ")),
     }
 }
 
-/// The problem of a file or folder, and its cure.
+/// The problem of a file or folder, and its fix.
 fn find_problem(path: &Path, metadata: &Metadata, own_uid: u32) -> Option<(String, String)> {
     let shown = path.display();
     if own_uid != 0 && metadata.uid() != own_uid {
@@ -86,7 +86,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let data = folder.path().join("data");
         assert_eq!(
-            permissions(&data).cure,
+            permissions(&data).fix,
             None,
             "a missing folder is no problem"
         );
@@ -99,9 +99,9 @@ mod tests {
             found.found.contains("admin-token has mode 0644"),
             "{found:?}"
         );
-        assert!(found.cure.unwrap().contains("chmod go= "));
+        assert!(found.fix.unwrap().contains("chmod go= "));
         fs::set_permissions(data.join(ADMIN_TOKEN_FILE), Permissions::from_mode(0o600)).unwrap();
-        assert_eq!(permissions(&data).cure, None);
+        assert_eq!(permissions(&data).fix, None);
         fs::set_permissions(&data, Permissions::from_mode(0o755)).unwrap();
         assert!(permissions(&data).found.contains("mode 0755"));
     }
@@ -110,8 +110,8 @@ mod tests {
     fn folder_of_another_user_is_reported() {
         let folder = tempfile::tempdir().unwrap();
         let metadata = fs::metadata(folder.path()).unwrap();
-        let (found, cure) = find_problem(folder.path(), &metadata, metadata.uid() + 1).unwrap();
+        let (found, fix) = find_problem(folder.path(), &metadata, metadata.uid() + 1).unwrap();
         assert!(found.contains("belongs to user"), "{found}");
-        assert!(cure.contains("chown"), "{cure}");
+        assert!(fix.contains("chown"), "{fix}");
     }
 }

@@ -1,4 +1,4 @@
-//! Text output of `faceoff doctor`. A *layer* is one protection of the sandbox, which the configuration may *give up*; a *cure*
+//! Text output of `faceoff doctor`. A *layer* is one protection of the sandbox, which the configuration may *give up*; a *fix*
 //! says how to fix a problem.
 
 use super::{Findings, LayerReport};
@@ -23,20 +23,20 @@ impl Findings {
             let HostFeature {
                 layer: name,
                 found,
-                cure,
+                fix,
                 ..
             } = &layer.feature;
             writeln!(out, "  {:<9} {:<14} {found}", layer.status(), name.as_str())?;
-            // A cure of several layers in a row is printed once, below the last.
-            if layers.peek().is_none_or(|next| next.feature.cure != *cure) {
-                print_cure(out, cure.as_deref())?;
+            // A fix of several layers in a row is printed once, below the last.
+            if layers.peek().is_none_or(|next| next.feature.fix != *fix) {
+                print_fix(out, fix.as_deref())?;
             }
         }
         writeln!(out, "Runtimes")?;
         for runtime in &self.runtimes {
             let status = if runtime.available { "ok" } else { "none" };
             writeln!(out, "  {status:<9} {:<14} {}", runtime.name, runtime.found)?;
-            print_cure(out, runtime.cure.as_deref())?;
+            print_fix(out, runtime.fix.as_deref())?;
             for link in &runtime.hidden_targets {
                 writeln!(out, "  {:<9}    links out: {link}", "")?;
             }
@@ -44,7 +44,7 @@ impl Findings {
         let memory = &self.in_memory;
         let status = if memory.available { "ok" } else { "none" };
         writeln!(out, "  {status:<9} {:<14} {}", "in memory", memory.found)?;
-        print_cure(out, memory.cure.as_deref())?;
+        print_fix(out, memory.fix.as_deref())?;
         let cpus = &self.cpus;
         writeln!(out, "CPUs")?;
         let bound = match cpus.agent_cpus.as_slice() {
@@ -57,34 +57,34 @@ impl Findings {
             "  {} usable, {} worker slot(s), agents on: {bound}",
             cpus.usable, cpus.slots
         )?;
-        print_cure(out, cpus.advice.as_deref())?;
+        print_fix(out, cpus.advice.as_deref())?;
         writeln!(out, "Descriptors")?;
         writeln!(out, "  {}", self.descriptors.found)?;
-        print_cure(out, self.descriptors.cure.as_deref())?;
+        print_fix(out, self.descriptors.fix.as_deref())?;
         writeln!(out, "Disks")?;
         for disk in &self.disks {
             writeln!(out, "  {}: {}", disk.folder.display(), disk.found)?;
-            print_cure(out, disk.cure.as_deref())?;
+            print_fix(out, disk.fix.as_deref())?;
         }
         writeln!(out, "Host")?;
         for checked in &self.host {
             writeln!(out, "  {}: {}", checked.name, checked.found)?;
-            print_cure(out, checked.cure.as_deref())?;
+            print_fix(out, checked.fix.as_deref())?;
         }
         if !self.nats.is_empty() {
             writeln!(out, "Remote worker")?;
         }
         for checked in &self.nats {
             writeln!(out, "  {}: {}", checked.name, checked.found)?;
-            print_cure(out, checked.cure.as_deref())?;
+            print_fix(out, checked.fix.as_deref())?;
         }
         Ok(())
     }
 }
 
-fn print_cure(out: &mut impl Write, cure: Option<&str>) -> std::io::Result<()> {
-    match cure {
-        Some(cure) => writeln!(out, "  {:<9} -> {cure}", ""),
+fn print_fix(out: &mut impl Write, fix: Option<&str>) -> std::io::Result<()> {
+    match fix {
+        Some(fix) => writeln!(out, "  {:<9} -> {fix}", ""),
         None => Ok(()),
     }
 }

@@ -17,7 +17,8 @@ pub(super) struct RuntimeReport {
     /// Where links of the runtime lead to files that agents do not see.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub hidden_targets: Vec<String>,
-    pub cure: Option<String>,
+    #[serde(rename = "cure")]
+    pub fix: Option<String>,
 }
 
 /// Inspects each runtime inside the sandbox, without the layers that this host lacks.
@@ -39,7 +40,7 @@ pub(super) fn runtime_reports(config: &Config, missing_layers: Vec<Layer>) -> Ve
                     }
                     _ => Vec::new(),
                 },
-                cure: cure(config, &name, &content),
+                fix: fix(config, &name, &content),
                 name,
             }
         })
@@ -50,7 +51,7 @@ pub(super) fn runtime_reports(config: &Config, missing_layers: Vec<Layer>) -> Ve
             available: false,
             found: "python3 was not found in the usual places".into(),
             hidden_targets: Vec::new(),
-            cure: Some("apt-get install python3".into()),
+            fix: Some("apt-get install python3".into()),
         });
     }
     found
@@ -119,7 +120,7 @@ fn describe(content: &RuntimeContent, runtime: Option<&Runtime>) -> String {
     }
 }
 
-fn cure(config: &Config, name: &str, content: &RuntimeContent) -> Option<String> {
+fn fix(config: &Config, name: &str, content: &RuntimeContent) -> Option<String> {
     let RuntimeContent::Failed { .. } = content else {
         return None;
     };

@@ -26,7 +26,7 @@ pub(super) fn check(config: &Config, name: Option<String>) -> anyhow::Result<Vec
     let mut found = vec![match connection.nats {
         Ok(version) => Check {
             name: "NATS",
-            cure: is_old(&version).then(|| {
+            fix: is_old(&version).then(|| {
                 "it works, but 2.12 or later is recommended: see docs/workers.md, Versions of NATS".to_owned()
             }),
             found: format!("nats-server {version} at {}", nats.url),
@@ -34,7 +34,7 @@ pub(super) fn check(config: &Config, name: Option<String>) -> anyhow::Result<Vec
         Err(error) => Check {
             name: "NATS",
             found: format!("cannot be reached at {}: {error}", nats.url),
-            cure: Some("start nats-server -js, or correct nats.url, nats.nkey_file and nats.ca_file".to_owned()),
+            fix: Some("start nats-server -js, or correct nats.url, nats.nkey_file and nats.ca_file".to_owned()),
         },
     }];
     if let Some(server) = connection.server {
@@ -42,12 +42,12 @@ pub(super) fn check(config: &Config, name: Option<String>) -> anyhow::Result<Vec
             Ok(()) => Check {
                 name: "server",
                 found: format!("would give jobs to a worker {name:?} on this host"),
-                cure: None,
+                fix: None,
             },
             Err(error) => Check {
                 name: "server",
                 found: "would give no jobs".to_owned(),
-                cure: Some(error),
+                fix: Some(error),
             },
         });
     }

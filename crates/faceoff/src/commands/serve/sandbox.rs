@@ -11,9 +11,9 @@ pub fn check_sandbox(features: &[HostFeature], given_up: &[Layer]) -> anyhow::Re
         if given_up.contains(&feature.layer) {
             tracing::warn!(layer = ?feature.layer, found = feature.found, "sandbox layer given up by configuration");
         } else {
-            let cure = feature.cure.as_deref().unwrap_or("not known for this host");
+            let fix = feature.fix.as_deref().unwrap_or("not known for this host");
             missing.push(format!(
-                "{}: {}\n    fix: {cure}",
+                "{}: {}\n    fix: {fix}",
                 layer_name(feature.layer),
                 feature.found
             ));
@@ -69,7 +69,7 @@ mod tests {
             layer,
             available,
             found: "no memory controller".into(),
-            cure: Some("enable it".into()),
+            fix: Some("enable it".into()),
         }
     }
 

@@ -10,11 +10,11 @@ use std::{fs, path::Path};
 const DOCKER_WITH_CGROUPS: &str = "in Docker: docker run --privileged --cgroupns=private";
 
 /// How to provide `layer`, which the host refused with `error`.
-pub(crate) fn cure(layer: Layer, error: &str) -> String {
+pub(crate) fn fix(layer: Layer, error: &str) -> String {
     match layer {
         Layer::Namespaces => match BubblewrapProgram::find() {
-            Err(problem) => problem.cure(),
-            Ok(_) => namespace_cure(error, blocking_setting()),
+            Err(problem) => problem.fix(),
+            Ok(_) => namespace_fix(error, blocking_setting()),
         },
         Layer::Seccomp => {
             "use a kernel with CONFIG_SECCOMP_FILTER=y (every distribution's since 2014), and give a root service in a container \
@@ -23,7 +23,7 @@ pub(crate) fn cure(layer: Layer, error: &str) -> String {
         }
         Layer::CgroupMemory | Layer::CgroupPids | Layer::CgroupCpu => {
             let is_version_2 = Path::new("/sys/fs/cgroup/cgroup.controllers").exists();
-            cgroup_cure(error, is_version_2)
+            cgroup_fix(error, is_version_2)
         }
         Layer::Rlimits => {
             format!(
@@ -34,8 +34,8 @@ pub(crate) fn cure(layer: Layer, error: &str) -> String {
     }
 }
 
-/// A missing permission has different cures: systemd can delegate cgroups of version 2 to an ordinary user; version 1 needs root.
-fn cgroup_cure(error: &str, is_version_2: bool) -> String {
+/// A missing permission has different fixes: systemd can delegate cgroups of version 2 to an ordinary user; version 1 needs root.
+fn cgroup_fix(error: &str, is_version_2: bool) -> String {
     if error.contains(NOT_MOUNTED) {
         return format!(
             "mount the control groups, as root: mount -t cgroup2 cgroup2 /sys/fs/cgroup; {DOCKER_WITH_CGROUPS}"
@@ -96,7 +96,7 @@ fn blocking_setting() -> Option<&'static str> {
 }
 
 /// `blocking_setting`: the command that changes a setting which blocks namespaces.
-fn namespace_cure(error: &str, blocking_setting: Option<&str>) -> String {
+fn namespace_fix(error: &str, blocking_setting: Option<&str>) -> String {
     /// Messages of bubblewrap if it may make namespaces, but has no privileges in them.
     const WITHOUT_PRIVILEGES: [&str; 2] = [
         "setting up uid map: Permission denied",
@@ -132,7 +132,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cure_of_cgroups_fits_the_error() {
+    fn fix_of_cgroups_fits_the_error() {
         let denied = "cannot make a cgroup in /sys/fs/cgroup/: Permission denied (os error 13)";
         for (error, is_version_2, expected) in [
             (denied, true, "systemd-run --user --scope"),
@@ -153,19 +153,19 @@ mod tests {
                 "Delegate=cpu memory pids",
             ),
         ] {
-            let cure = cgroup_cure(error, is_version_2);
-            assert!(cure.contains(expected), "{error}: {cure}");
+            let fix = cgroup_fix(error, is_version_2);
+            assert!(fix.contains(expected), "{error}: {fix}");
             // Root is refused for the same reason, except if only the permission is missing.
             assert_eq!(
-                cure.contains("run the service as root"),
+                fix.contains("run the service as root"),
                 error == denied,
-                "{error}: {cure}"
+                "{error}: {fix}"
             );
         }
     }
 
     #[test]
-    fn cure_of_namespaces_fits_the_message_of_bubblewrap() {
+    fn fix_of_namespaces_fits_the_message_of_bubblewrap() {
         const SETTING: &str = "sysctl -w kernel.apparmor_restrict_unprivileged_userns=0";
         for (error, setting, expected) in [
             (
@@ -194,9 +194,9 @@ mod tests {
                 "allow user namespaces",
             ),
         ] {
-            let cure = namespace_cure(error, setting);
-            assert!(cure.contains(expected), "{error}: {cure}");
-            assert!(!cure.contains("install"), "{error}: {cure}");
+            let fix = namespace_fix(error, setting);
+            assert!(fix.contains(expected), "{error}: {fix}");
+            assert!(!fix.contains("install"), "{error}: {fix}");
         }
     }
 }
