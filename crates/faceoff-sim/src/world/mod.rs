@@ -32,7 +32,7 @@ use crate::{
     },
 };
 use arm::Arm;
-pub use bounds::{Bounds, Divergence, Runaway};
+pub use bounds::{Bounds, Divergence, DivergenceCause};
 pub use impacts::{ContactBody, Impact, Impacts};
 
 /// A mallet's striking cylinder: centre x, y, z (m) and velocity vx, vy (m/s), table frame.

@@ -254,7 +254,7 @@ fn check_world<T: Lanes, A>(
     for (robot, arm) in world.arms.iter_mut().enumerate() {
         arms.store(lane_world.first_lane + robot, arm);
     }
-    let Some(cause) = world.find_runaway() else {
+    let Some(cause) = world.find_divergence_cause() else {
         return;
     };
     world.puck = puck_before;

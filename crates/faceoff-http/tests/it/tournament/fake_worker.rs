@@ -5,7 +5,7 @@ use crate::site::{LEASE_S, Site};
 use faceoff_airhockey::{EE, EVALUATION, competition};
 use faceoff_scoring::{
     tier_of,
-    tournament::{Forfeit, GameScore, GameTally, SideScore, final_score, judge},
+    tournament::{ForfeitKind, GameScore, GameTally, SideScore, final_score, judge},
 };
 use faceoff_store::{
     ClaimedJob, CommitOutcome, Game, GameCommit, GamePurpose, GameRecording, Job, JobClaim,
@@ -50,7 +50,7 @@ impl GameOutcome {
         let windows = self.windows;
         let forfeits = self
             .forfeits
-            .map(|forfeits| forfeits.then_some(Forfeit::Faults));
+            .map(|forfeits| forfeits.then_some(ForfeitKind::Faults));
         let played = final_score(self.goals, self.fouls);
         let result = judge(&GameTally {
             score: played,
