@@ -73,7 +73,7 @@ pub use operations::{
     submission_description::SubmissionDescription,
     teams::TeamChange,
     tokens::{
-        EndMade, LAST_USE_INTERVAL, MAX_TOKENS, NewToken, Principal, RevokedToken,
+        LAST_USE_INTERVAL, MAX_TOKENS, NewToken, Principal, RevocationExtent, RevokedToken,
         SESSION_LIFETIME, TokenRejection, VerifiedToken,
     },
     tournament::{

@@ -26,7 +26,8 @@ pub struct StageSettings {
     /// When its datasets become public.
     pub publishes: Publication,
     /// Which result of a team counts on the board.
-    pub standings: CountingResult,
+    #[serde(rename = "standings")]
+    pub counting_result: CountingResult,
     /// Upload quotas that differ from the server's configuration; absent if none do.
     #[serde(skip_serializing_if = "StageUploadLimits::is_none")]
     pub uploads: StageUploadLimits,
@@ -41,7 +42,7 @@ impl Default for StageSettings {
             day_deadline: DayDeadline::NextCutoff,
             blind: false,
             publishes: Publication::AtClose,
-            standings: CountingResult::Latest,
+            counting_result: CountingResult::Latest,
             uploads: StageUploadLimits::default(),
         }
     }
@@ -65,7 +66,7 @@ impl StageSettings {
             return Err(InvalidStageRules::Deadline(hours));
         }
         self.uploads.check().map_err(InvalidStageRules::Uploads)?;
-        match self.standings {
+        match self.counting_result {
             CountingResult::MeanOfLast(days) if !(1..=MAX_MEAN_DAYS).contains(&days) => {
                 Err(InvalidStageRules::MeanDays(days))
             }
@@ -209,7 +210,7 @@ mod tests {
         }
         for days in [0, MAX_MEAN_DAYS + 1] {
             let mean = StageSettings {
-                standings: CountingResult::MeanOfLast(days),
+                counting_result: CountingResult::MeanOfLast(days),
                 ..settings.clone()
             };
             assert_eq!(mean.check(), Err(InvalidStageRules::MeanDays(days)));
@@ -218,7 +219,7 @@ mod tests {
 
     #[test]
     fn settings_round_trip_in_json_and_text() {
-        for (standings, json, words) in [
+        for (counting_result, json, words) in [
             (CountingResult::Latest, r#""latest""#, "latest"),
             (CountingResult::Best, r#""best""#, "best"),
             (
@@ -228,13 +229,13 @@ mod tests {
             ),
             (CountingResult::Final, r#""final""#, "final"),
         ] {
-            assert_eq!(serde_json::to_string(&standings).unwrap(), json);
+            assert_eq!(serde_json::to_string(&counting_result).unwrap(), json);
             assert_eq!(
                 serde_json::from_str::<CountingResult>(json).unwrap(),
-                standings
+                counting_result
             );
-            assert_eq!(standings.to_string(), words);
-            assert_eq!(words.parse(), Ok(standings));
+            assert_eq!(counting_result.to_string(), words);
+            assert_eq!(words.parse(), Ok(counting_result));
         }
         for publishes in Publication::ALL {
             let json = format!("{:?}", publishes.as_str());

@@ -170,7 +170,7 @@ impl Default for EvaluationConfig {
             tier_bounds: competition().tiers,
             perturbations: Magnitudes::default(),
             publishes: settings.publishes,
-            standings: settings.standings,
+            standings: settings.counting_result,
         }
     }
 }
@@ -420,7 +420,7 @@ impl Config {
             episodes_per_shard: evaluation.episodes_per_shard,
             day_deadline: evaluation.day_deadline,
             publishes: evaluation.publishes,
-            standings: evaluation.standings,
+            counting_result: evaluation.standings,
             ..StageSettings::default()
         })
     }

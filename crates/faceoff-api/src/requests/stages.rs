@@ -323,7 +323,7 @@ impl StagePatch {
         replace(&mut settings.day_deadline, self.day_deadline.as_ref());
         replace(&mut settings.blind, self.blind.as_ref());
         replace(&mut settings.publishes, self.publishes.as_ref());
-        replace(&mut settings.standings, self.standings.as_ref());
+        replace(&mut settings.counting_result, self.standings.as_ref());
         replace(&mut settings.uploads, self.uploads.as_ref());
         rules.check()?;
         settings.check()
@@ -395,7 +395,7 @@ mod tests {
             day_deadline: DayDeadline::Hours(30),
             blind: true,
             publishes: Publication::Never,
-            standings: CountingResult::Best,
+            counting_result: CountingResult::Best,
             uploads: StageUploadLimits {
                 waiting: Some(2),
                 ..StageUploadLimits::default()

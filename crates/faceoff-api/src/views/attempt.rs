@@ -32,11 +32,14 @@ pub enum AttemptOutcomeView {
     /// A result. It counts unless it is voided.
     Played,
     /// A platform fault.
-    Broken,
+    #[serde(rename = "broken")]
+    PlatformFailed,
     /// The slot was shut down or lacked disk space. The attempt does not count towards the game's limit of attempts.
-    GivenBack,
+    #[serde(rename = "given_back")]
+    Released,
     /// The slot's process ended, or its lease expired.
     Lost,
     /// The game was cancelled while it was running.
-    CalledOff,
+    #[serde(rename = "called_off")]
+    Cancelled,
 }

@@ -62,7 +62,7 @@ async fn page_with(
         profiles: app.config.competition().profile_names().collect(),
         confirm: needs_confirmation.then(|| view.name.to_string()),
         is_closed: view.phase == PhaseView::Closed,
-        has_final_day: view.settings.standings == CountingResult::Final,
+        has_final_day: view.settings.counting_result == CountingResult::Final,
         has_tiers: app.config.competition().tiers.is_some(),
         stage: view,
     };

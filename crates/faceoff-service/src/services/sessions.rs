@@ -8,7 +8,9 @@ use crate::{
     problem::{Problem, ProblemKind},
 };
 use faceoff_api::token::{Secret, SecretKind};
-use faceoff_store::{EndMade, NewToken, Requester, SESSION_LIFETIME, TokenKind, TokenOwner};
+use faceoff_store::{
+    NewToken, Requester, RevocationExtent, SESSION_LIFETIME, TokenKind, TokenOwner,
+};
 use faceoff_types::UserId;
 use jiff::Timestamp;
 
@@ -26,7 +28,7 @@ pub fn session_expiry(now: Timestamp) -> Timestamp {
 pub async fn end(app: &AppState, caller: &Caller) -> Result<(), Problem> {
     let (token, now) = (caller.token.id, app.config.clock.now());
     app.store
-        .revoke_token(caller.actor(), token, EndMade::Keep, now)
+        .revoke_token(caller.actor(), token, RevocationExtent::TokenOnly, now)
         .await?;
     Ok(())
 }

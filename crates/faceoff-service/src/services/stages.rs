@@ -138,8 +138,8 @@ pub async fn change_stage(
     let mut effects = Vec::new();
     if stage.phase(now) == StagePhase::Open {
         let new_revision = (rules != *current_rules).then(|| new_revision_effect(&stage));
-        let reordering = (settings.standings != stage.settings.standings)
-            .then(|| reordering_effect(&stage, settings.standings));
+        let reordering = (settings.counting_result != stage.settings.counting_result)
+            .then(|| reordering_effect(&stage, settings.counting_result));
         effects.extend(new_revision.into_iter().chain(reordering));
     }
     if let Some(retention) = &retention {
@@ -214,10 +214,10 @@ fn new_revision_effect(stage: &Stage) -> String {
     )
 }
 
-fn reordering_effect(stage: &Stage, standings: CountingResult) -> String {
+fn reordering_effect(stage: &Stage, counting_result: CountingResult) -> String {
     format!(
-        "the rows of its boards will be selected by {standings} instead of {}, at once, from all results",
-        stage.settings.standings
+        "the rows of its boards will be selected by {counting_result} instead of {}, at once, from all results",
+        stage.settings.counting_result
     )
 }
 

@@ -10,12 +10,12 @@ use crate::{
     views::{credentials, token},
 };
 use faceoff_api::{
-    requests::{self, Made},
+    requests::{self, CreatedCredentials},
     token::{Secret, SecretKind},
     views::{credentials::RevokedTokenView, token::NewTokenView},
 };
 use faceoff_store::{
-    EndMade, NewToken, Principal, StoreError, Token, TokenKind, TokenOwner, TokensOf,
+    NewToken, Principal, RevocationExtent, StoreError, Token, TokenKind, TokenOwner, TokensOf,
 };
 use faceoff_types::{TeamId, TokenId};
 
@@ -173,14 +173,14 @@ pub async fn rotate_token(
     })
 }
 
-/// Revokes a token: it is invalid from now on. What was made with it ends, too, or stays, as `made` says; otherwise it ends unless the token
-/// is the caller's own, because it may have been stolen.
+/// Revokes a token: it is invalid from now on. `created_credentials` says what happens to the credentials that were
+/// created with it. By default they end, too, unless the token is the caller's own: another user's may have been stolen.
 #[boxed]
 pub async fn revoke_token(
     app: &AppState,
     caller: &Caller,
     id: TokenId,
-    made: Option<Made>,
+    created_credentials: Option<CreatedCredentials>,
 ) -> Result<RevokedTokenView, Problem> {
     let token = find(app, caller, id).await?;
     let is_own = match (&caller.principal, token.owner) {
@@ -191,14 +191,18 @@ pub async fn revoke_token(
         _ => false,
     };
     let now = app.config.clock.now();
-    let default = if is_own { Made::Keep } else { Made::End };
-    let made = match made.unwrap_or(default) {
-        Made::Keep => EndMade::Keep,
-        Made::End => EndMade::Except(Some(caller.token.id)),
+    let default = if is_own {
+        CreatedCredentials::Keep
+    } else {
+        CreatedCredentials::End
+    };
+    let extent = match created_credentials.unwrap_or(default) {
+        CreatedCredentials::Keep => RevocationExtent::TokenOnly,
+        CreatedCredentials::End => RevocationExtent::WithCreatedExcept(Some(caller.token.id)),
     };
     let revoked = app
         .store
-        .revoke_token(caller.actor(), id, made, now)
+        .revoke_token(caller.actor(), id, extent, now)
         .await?;
     tracing::info!(token = %id, actor = %caller.actor(), "token revoked");
     Ok(RevokedTokenView {

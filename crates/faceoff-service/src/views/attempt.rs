@@ -9,10 +9,10 @@ use faceoff_store::{AttemptOutcome, GameAttempt};
 pub fn view(attempt: GameAttempt) -> GameAttemptView {
     let end = attempt.end.as_ref().map(|end| match end.outcome {
         AttemptOutcome::Played => AttemptOutcomeView::Played,
-        AttemptOutcome::PlatformFailed => AttemptOutcomeView::Broken,
-        AttemptOutcome::Released => AttemptOutcomeView::GivenBack,
+        AttemptOutcome::PlatformFailed => AttemptOutcomeView::PlatformFailed,
+        AttemptOutcome::Released => AttemptOutcomeView::Released,
         AttemptOutcome::Lost => AttemptOutcomeView::Lost,
-        AttemptOutcome::Cancelled => AttemptOutcomeView::CalledOff,
+        AttemptOutcome::Cancelled => AttemptOutcomeView::Cancelled,
     });
     GameAttemptView {
         number: attempt.number,

@@ -19,7 +19,7 @@ pub(super) async fn counting_result(
     stage: &Stage,
     scope: &BoardScope,
 ) -> Result<CountingResult, Problem> {
-    let counting_result = stage.settings.standings;
+    let counting_result = stage.settings.counting_result;
     if counting_result != CountingResult::Final {
         return Ok(counting_result);
     }

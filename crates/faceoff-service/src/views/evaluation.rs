@@ -51,8 +51,8 @@ pub async fn build(
 ) -> Result<EvaluationView, Problem> {
     let team = app.store.team(evaluation.team).await?;
     let run = evaluation.run;
-    let shows_faults =
-        visibility.is_own(&evaluation) && !visibility.is_hidden(evaluation.stage_day.stage);
+    let shows_faults = visibility.has_team_access(&evaluation)
+        && !visibility.is_hidden(evaluation.stage_day.stage);
     let mut view = evaluation_view(visibility, evaluation, team.name);
     if let EvaluationStatus::AgentFailed { faults, log, .. } = &mut view.status
         && view.released_at.is_some()
@@ -138,7 +138,8 @@ pub async fn all(
         .collect()
 }
 
-/// Was the seed of a repetition's day public when it was requested? An extra evaluation (`extra_for`: its reason) has a seed of its own.
+/// Was the day's seed already public when a rerun was requested? False for an extra evaluation (`extra_for`: its reason), which has its
+/// own seed.
 pub(super) fn used_public_episodes(
     created_at: Timestamp,
     released_at: Option<Timestamp>,

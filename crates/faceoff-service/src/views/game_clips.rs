@@ -56,8 +56,9 @@ impl GameClips {
         })?;
         Ok(Self {
             file,
-            can_see_observations: Side::BOTH
-                .map(|side| visibility.is_own(game, side) || visibility.can_see_both_sides(game)),
+            can_see_observations: Side::BOTH.map(|side| {
+                visibility.has_team_access(game, side) || visibility.can_see_both_sides(game)
+            }),
         })
     }
 

@@ -145,7 +145,7 @@ async fn board_record(
 }
 
 /// The boards without and with the proposed results, and the differences.
-async fn outcome(
+async fn board_effect(
     app: &AppState,
     proposal: &Proposal,
     proposed: &[ProposedEvaluation],
@@ -260,8 +260,8 @@ pub async fn list(app: &AppState, proposals: Vec<Proposal>) -> Result<Vec<Propos
 pub async fn find(app: &AppState, id: ProposalId) -> Result<ProposalView, Problem> {
     let (proposal, proposed) = app.store.proposal(id).await?;
     let summary = summary(app, &proposal, &proposed).await?;
-    let outcome = match summary.state {
-        ProposalStateView::Played => Some(outcome(app, &proposal, &proposed).await?),
+    let board_effect = match summary.state {
+        ProposalStateView::Played => Some(board_effect(app, &proposal, &proposed).await?),
         _ => None,
     };
     let is_dropped = matches!(proposal.outcome, Some(ProposalOutcome::Dropped(_)));
@@ -271,7 +271,7 @@ pub async fn find(app: &AppState, id: ProposalId) -> Result<ProposalView, Proble
     }
     Ok(ProposalView {
         evaluations,
-        outcome,
+        outcome: board_effect,
         ..summary
     })
 }

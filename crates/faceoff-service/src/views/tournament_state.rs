@@ -14,8 +14,8 @@ use faceoff_store::{
 use faceoff_types::{RoundNumber, Seed, TeamId, TeamName, TournamentId};
 use std::collections::BTreeMap;
 
-/// More than a round can have pairings, so that the pairs of different rounds get different numbers.
-const MAX_PAIRINGS_PER_ROUND: u32 = 100_000;
+/// Pair numbers reserved for each round: more than a round has pairings, so the numbers of two rounds differ.
+const PAIR_NUMBERS_PER_ROUND: u32 = 100_000;
 
 /// The complete state of a tournament, with draws and results in the scoring's types.
 #[derive(Debug)]
@@ -131,7 +131,7 @@ impl TournamentState {
         game_entry.pair = schedule_entry
             .filter(|_| self.tournament.rules.mirrored)
             .map(|schedule_entry| {
-                schedule_entry.round.get() * MAX_PAIRINGS_PER_ROUND + schedule_entry.pairing
+                schedule_entry.round.get() * PAIR_NUMBERS_PER_ROUND + schedule_entry.pairing
             });
         let played = PlayedGame::try_from(game_entry).map_err(|error| damaged(&error))?;
         Ok(Some((score, played)))

@@ -34,7 +34,7 @@ fn check_closed(stage: &Stage, now: Timestamp, requirement: &str) -> Result<()> 
 
 /// Do the stage's standings need a final day that has not started? A stage without any score needs none.
 pub(crate) async fn is_final_day_pending(tx: &mut Tx, stage: &Stage) -> Result<bool> {
-    Ok(stage.settings.standings == CountingResult::Final
+    Ok(stage.settings.counting_result == CountingResult::Final
         && stage.sign_off.is_none()
         && sign_offs::final_cutoff(tx, stage.id).await?.is_none()
         && sign_offs::count_scored(tx, stage.id).await? > 0)
@@ -133,12 +133,12 @@ impl Store {
             season::check_open(tx).await?;
             let stage = stages::find(tx, id).await?;
             sign_offs::check_not_signed_off(tx, id).await?;
-            if stage.settings.standings != CountingResult::Final {
+            if stage.settings.counting_result != CountingResult::Final {
                 return StoreError::conflict(format!(
                     "the standings of the stage {:?} are “{}”, so it has no final day; only one whose standings are \
                      “final” has",
                     stage.name.as_str(),
-                    stage.settings.standings
+                    stage.settings.counting_result
                 ));
             }
             check_closed(&stage, now, "its final day comes after that")?;

@@ -59,13 +59,13 @@ pub struct NewToken {
     pub expires_at: Option<Timestamp>,
 }
 
-/// What happens to all that was made with a revoked token.
+/// What the revocation of a token covers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum EndMade {
-    /// It stays.
-    Keep,
-    /// It ends, except the token of the request.
-    Except(Option<TokenId>),
+pub enum RevocationExtent {
+    /// The token only; the credentials that were created with it stay valid.
+    TokenOnly,
+    /// Also the credentials that were created with it, except the token of the request.
+    WithCreatedExcept(Option<TokenId>),
 }
 
 /// A token that was revoked, and what ended with it.
@@ -312,7 +312,7 @@ impl Store {
         &self,
         actor: Actor,
         id: TokenId,
-        made: EndMade,
+        extent: RevocationExtent,
         now: Timestamp,
     ) -> Result<RevokedToken> {
         self.write(actor, now, async |tx| {
@@ -320,9 +320,9 @@ impl Store {
             if token.revoked_at.is_none() {
                 revoke_token(tx, &token).await?;
             }
-            let ended = match made {
-                EndMade::Keep => EndedCredentials::default(),
-                EndMade::Except(kept) => {
+            let ended = match extent {
+                RevocationExtent::TokenOnly => EndedCredentials::default(),
+                RevocationExtent::WithCreatedExcept(kept) => {
                     let reason = "the token with which it was made was revoked";
                     revoke_created_with(tx, id, kept, reason).await?
                 }

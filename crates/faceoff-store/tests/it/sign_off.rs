@@ -34,9 +34,9 @@ fn blind_settings() -> StageSettings {
 }
 
 /// `standings` chooses the result of a team that counts for its rank.
-fn settings_with_standings(standings: CountingResult) -> StageSettings {
+fn settings_with_counting_result(counting_result: CountingResult) -> StageSettings {
     StageSettings {
-        standings,
+        counting_result,
         ..StageSettings::default()
     }
 }
@@ -220,7 +220,7 @@ async fn signed_off_stage_cannot_be_changed() {
 async fn final_day_runs_once_between_close_and_sign_off() {
     let mut f = TestStore::new().await;
     f.valid_submission_of("Alpha").await;
-    let stage = create_stage(&f, settings_with_standings(CountingResult::Final)).await;
+    let stage = create_stage(&f, settings_with_counting_result(CountingResult::Final)).await;
     start_day(&f, &stage).await;
     f.run_all_with_score(10.0).await;
     let start_final_day = async |now| f.store.start_final_day(Actor::Host, stage.id, now).await;
@@ -281,7 +281,8 @@ async fn final_day_runs_once_between_close_and_sign_off() {
 #[tokio::test]
 async fn final_day_needs_its_own_date_and_a_submission() {
     let mut f = TestStore::new().await;
-    let without_final_day = create_stage(&f, settings_with_standings(CountingResult::Best)).await;
+    let without_final_day =
+        create_stage(&f, settings_with_counting_result(CountingResult::Best)).await;
     let started = f
         .store
         .start_final_day(Actor::Host, without_final_day.id, f.now);
@@ -295,7 +296,7 @@ async fn final_day_needs_its_own_date_and_a_submission() {
         zone: IanaTimeZone::UTC,
         rules,
         settings: StageSettings {
-            standings: CountingResult::Final,
+            counting_result: CountingResult::Final,
             ..settings
         },
     };

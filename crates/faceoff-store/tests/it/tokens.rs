@@ -96,14 +96,24 @@ async fn token_is_valid_until_expired_rotated_or_revoked() {
     for _ in 0..2 {
         let revoked = f
             .store
-            .revoke_token(Actor::Host, unlimited.id, EndMade::Keep, f.now)
+            .revoke_token(
+                Actor::Host,
+                unlimited.id,
+                RevocationExtent::TokenOnly,
+                f.now,
+            )
             .await;
         assert_eq!(revoked.unwrap().token.revoked_at, Some(f.now));
     }
     assert_eq!(rejection(&f, 5).await, Some(TokenRejection::Revoked(f.now)));
     let unknown = f
         .store
-        .revoke_token(Actor::Host, TokenId::new(), EndMade::Keep, f.now)
+        .revoke_token(
+            Actor::Host,
+            TokenId::new(),
+            RevocationExtent::TokenOnly,
+            f.now,
+        )
         .await;
     assert!(matches!(unknown, Err(StoreError::NotFound("token"))));
     let events = f.store.events_after(0, 100).await.unwrap();
@@ -138,7 +148,7 @@ async fn token_use_is_recorded_and_tokens_are_limited() {
     assert_eq!(used.last_used_at, Some(f.now));
     // A revoked token does not count towards the limit.
     f.store
-        .revoke_token(Actor::Host, used.id, EndMade::Keep, f.now)
+        .revoke_token(Actor::Host, used.id, RevocationExtent::TokenOnly, f.now)
         .await
         .unwrap();
     f.store
@@ -182,7 +192,12 @@ async fn host_token_follows_its_file_and_stays_revoked() {
     rotate(other_host_token.id, 9).await.unwrap();
     assert!(!f.store.set_host_token([1; 32], f.now).await.unwrap());
     f.store
-        .revoke_token(Actor::Host, other_host_token.id, EndMade::Keep, f.now)
+        .revoke_token(
+            Actor::Host,
+            other_host_token.id,
+            RevocationExtent::TokenOnly,
+            f.now,
+        )
         .await
         .unwrap();
     assert!(!f.store.set_host_token([9; 32], f.now).await.unwrap());
@@ -403,7 +418,7 @@ async fn ended_credentials_are_forgotten_after_a_month() {
     let leaf = create(&f, 3, Some((next, [9; 32]))).await;
     for ended in [middle, next] {
         f.store
-            .revoke_token(Actor::Host, ended, EndMade::Keep, f.now)
+            .revoke_token(Actor::Host, ended, RevocationExtent::TokenOnly, f.now)
             .await
             .unwrap();
     }
@@ -412,7 +427,7 @@ async fn ended_credentials_are_forgotten_after_a_month() {
     let of_host = f.store.verify_token([7; 32], TokenKind::ApiToken, f.now);
     let of_host = of_host.await.unwrap().unwrap().token.id;
     f.store
-        .revoke_token(Actor::Host, of_host, EndMade::Keep, f.now)
+        .revoke_token(Actor::Host, of_host, RevocationExtent::TokenOnly, f.now)
         .await
         .unwrap();
     let expires_at = f.now + SignedDuration::from_hours(1);
@@ -457,7 +472,12 @@ async fn ended_credentials_are_forgotten_after_a_month() {
     assert!(!f.store.set_host_token([7; 32], f.now).await.unwrap());
     // What was made with the forgotten tokens still ends with the token that made that one.
     f.store
-        .revoke_token(Actor::Host, root, EndMade::Except(None), f.now)
+        .revoke_token(
+            Actor::Host,
+            root,
+            RevocationExtent::WithCreatedExcept(None),
+            f.now,
+        )
         .await
         .unwrap();
     assert_eq!(rejection(&f, 3).await, Some(TokenRejection::Revoked(f.now)));

@@ -3,9 +3,9 @@
 use super::{Client, read_json};
 use faceoff_api::{
     requests::{
-        Confirmation, Decision, JoinRequest, Made, NewAnnouncement, NewAnswer, NewInvitation,
-        NewPassword, NewQuestion, NewTeam, NewTerms, NewToken, Reason, RegistrationRequest,
-        RevocationQuery, SeasonChange, TeamChange, UserChange,
+        Confirmation, CreatedCredentials, Decision, JoinRequest, NewAnnouncement, NewAnswer,
+        NewInvitation, NewPassword, NewQuestion, NewTeam, NewTerms, NewToken, Reason,
+        RegistrationRequest, RevocationQuery, SeasonChange, TeamChange, UserChange,
     },
     views::{
         announcement::{AnnouncementView, QuestionView, TermsView},
@@ -44,7 +44,7 @@ impl Client {
     pub async fn revoke_token(
         &self,
         id: TokenId,
-        made: Option<Made>,
+        made: Option<CreatedCredentials>,
     ) -> anyhow::Result<RevokedTokenView> {
         let request = self.request(Method::DELETE, &format!("/tokens/{id}"));
         let request = request.query(&RevocationQuery { made });

@@ -9,7 +9,7 @@ use crate::client::Client;
 use anyhow::Context;
 use clap::{Args, Subcommand};
 use faceoff_api::{
-    requests::{Made, NewToken},
+    requests::{CreatedCredentials, NewToken},
     views::token::TokenView,
 };
 use faceoff_types::{TeamId, TokenId};
@@ -115,8 +115,8 @@ pub(super) async fn act(client: &Client, json: bool, action: TokenAction) -> any
             end_made,
         } => {
             let made = match (keep_made, end_made) {
-                (true, _) => Some(Made::Keep),
-                (false, true) => Some(Made::End),
+                (true, _) => Some(CreatedCredentials::Keep),
+                (false, true) => Some(CreatedCredentials::End),
                 (false, false) => None,
             };
             let revoked = client.revoke_token(token, made).await?;

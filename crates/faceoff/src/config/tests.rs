@@ -89,7 +89,7 @@ fn all_sections_are_read() {
     assert_eq!(loss("steps"), Some(Magnitude::Counts([5, 20])));
     let settings = config.settings().unwrap();
     assert_eq!(settings.publishes, Publication::Never);
-    assert_eq!(settings.standings, CountingResult::MeanOfLast(5));
+    assert_eq!(settings.counting_result, CountingResult::MeanOfLast(5));
     assert_eq!(config.slots(), 3);
     assert_eq!(config.limits.pids, 9);
     assert_eq!(config.limits.open_files, Limits::default().open_files);

@@ -190,7 +190,7 @@ pub(super) static GROUPS: [InputGroup; 4] = [
                 hint: "latest: the newest; best: the highest ranked; final: only that of the final day, after the stage has closed; \
 mean_of_last:5: the mean of the last 5 days",
                 kind: InputKind::Text,
-                text: |stage| stage.settings.standings.to_string(),
+                text: |stage| stage.settings.counting_result.to_string(),
                 read: |form, patch| parse(form, "standings", &mut patch.standings),
             },
             Input {

@@ -294,7 +294,7 @@ fn stage_text(stage: &StageView) -> String {
         } else {
             "custom"
         },
-        settings.standings,
+        settings.counting_result,
         match settings.publishes {
             Publication::Never => "if the team publishes them",
             Publication::AtClose => "when the stage closes",

@@ -140,10 +140,10 @@ pub(in crate::commands) fn attempts_text(attempts: &[GameAttemptView]) -> String
             (Some(end), Some(ended_at)) => {
                 let outcome = match end {
                     AttemptOutcomeView::Played => "finished",
-                    AttemptOutcomeView::Broken => "platform fault",
-                    AttemptOutcomeView::GivenBack => "released by its slot",
+                    AttemptOutcomeView::PlatformFailed => "platform fault",
+                    AttemptOutcomeView::Released => "released by its slot",
                     AttemptOutcomeView::Lost => "lost with its slot",
-                    AttemptOutcomeView::CalledOff => "cancelled",
+                    AttemptOutcomeView::Cancelled => "cancelled",
                 };
                 format!("{outcome} {}", exact_time_text(ended_at))
             }
