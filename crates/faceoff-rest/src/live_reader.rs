@@ -283,7 +283,7 @@ impl LiveReader {
             return Ok(None);
         };
         let score: faceoff_scoring::tournament::GameScore =
-            serde_json::from_value(result.score).map_err(Problem::internal)?;
+            serde_json::from_value(result.results).map_err(Problem::internal)?;
         Ok(Some(LiveGame {
             game: self.game,
             attempt: result.attempt,

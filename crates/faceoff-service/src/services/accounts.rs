@@ -67,7 +67,7 @@ pub async fn join(
     // Checked before the password is hashed, which is expensive.
     app.store.code_status(code_hash, now).await?;
     let team = request.team.map(checked_profile).transpose()?;
-    let password = match request.password {
+    let password_hash = match request.password {
         Some(password) => Some(app.passwords.hash(password, client).await?),
         None => None,
     };
@@ -79,7 +79,7 @@ pub async fn join(
     let join_request = JoinRequest {
         code_hash,
         name: request.name,
-        password,
+        password_hash,
         team,
         accepted_terms: request.accepted_terms,
         token_hash: secret.hash(),

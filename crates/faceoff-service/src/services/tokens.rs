@@ -15,7 +15,7 @@ use faceoff_api::{
     views::{credentials::RevokedTokenView, token::NewTokenView},
 };
 use faceoff_store::{
-    NewToken, Principal, RevocationExtent, StoreError, Token, TokenKind, TokenOwner, TokensOf,
+    NewToken, Principal, RevocationExtent, StoreError, Token, TokenFilter, TokenKind, TokenOwner,
 };
 use faceoff_types::{TeamId, TokenId};
 
@@ -24,10 +24,10 @@ const MAX_NAME_CHARS: usize = 80;
 
 /// The tokens that the caller may see and revoke: organisers all, a member their own and the team's. `None`: only the one that the
 /// request was sent with, for a team's API client. A leaked token must not end others, or get the secret of one that lasts longer.
-const fn manageable(caller: &Caller) -> Option<TokensOf> {
+const fn manageable(caller: &Caller) -> Option<TokenFilter> {
     match &caller.principal {
-        Principal::Host | Principal::Organiser(_) => Some(TokensOf::Everyone),
-        Principal::Member(user, team) => Some(TokensOf::Member(user.id, team.id)),
+        Principal::Host | Principal::Organiser(_) => Some(TokenFilter::Everyone),
+        Principal::Member(user, team) => Some(TokenFilter::Member(user.id, team.id)),
         Principal::Team(_) => None,
     }
 }

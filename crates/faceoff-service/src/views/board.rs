@@ -319,7 +319,7 @@ fn row_view(ranked: RankedEntry<Row>, rank_group: u32, task: Option<Task>) -> Bo
         evaluation: record.evaluation,
         evaluations,
         day: record.day,
-        extra_evaluation: record.extra_for,
+        extra_evaluation: record.extra_reason,
         rerun_after_release: record.rerun_after_release,
         finished_at: record.finished_at,
         ruleset: result.ruleset,

@@ -38,7 +38,7 @@ impl GameClips {
         game: &Game,
     ) -> Result<Self, Problem> {
         let recording = match &game.state {
-            GameState::Played(played_row) => played_row.recording.as_ref(),
+            GameState::Played(stored_result) => stored_result.recording.as_ref(),
             _ => None,
         };
         let conflict = |detail: &str| Problem::new(ProblemKind::Conflict, detail);

@@ -116,10 +116,10 @@ async fn board_record(
         return Ok(None);
     }
     let submission = app.store.submission(evaluation.submission).await?;
-    let (released_at, extra_for) = match evaluation.replaces {
+    let (released_at, extra_reason) = match evaluation.replaces {
         Some(id) => {
             let replaced = app.store.evaluation(id).await?;
-            (replaced.released_at, replaced.extra_for)
+            (replaced.released_at, replaced.extra_reason)
         }
         None => (None, None),
     };
@@ -136,9 +136,9 @@ async fn board_record(
         rerun_after_release: used_public_episodes(
             evaluation.created_at,
             released_at,
-            extra_for.as_deref(),
+            extra_reason.as_deref(),
         ),
-        extra_for,
+        extra_reason,
         finished_at: *finished_at,
         result: (**result).clone(),
     }))
@@ -182,7 +182,7 @@ async fn board_effect(
                 new_board: build_board(revision, &empty_scope, proposed_records).await?,
             });
         }
-        ProposalKind::Rules(_) => app.store.board_revision(&stage).await?,
+        ProposalKind::DayWithNewestRules(_) => app.store.board_revision(&stage).await?,
         ProposalKind::Evaluation(_) | ProposalKind::Day(_) => revision,
     };
     let old_board = build_board(old_revision, &BoardScope::default(), Vec::new()).await?;
@@ -299,7 +299,7 @@ async fn summary(
             ProposalKind::Trial => ProposalKindView::Trial,
             ProposalKind::Evaluation(_) => ProposalKindView::Evaluation,
             ProposalKind::Day(_) => ProposalKindView::Day,
-            ProposalKind::Rules(_) => ProposalKindView::Rules,
+            ProposalKind::DayWithNewestRules(_) => ProposalKindView::Rules,
         },
         day: proposal.kind.day(),
         reason: proposal.reason.clone(),

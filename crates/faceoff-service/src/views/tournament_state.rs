@@ -107,14 +107,14 @@ impl TournamentState {
 
     /// The scored result of a game; `None` without a result.
     pub fn result(&self, game: &Game) -> Result<Option<(GameScore, PlayedGame)>, Problem> {
-        let GameState::Played(played_row) = &game.state else {
+        let GameState::Played(stored_result) = &game.state else {
             return Ok(None);
         };
         let damaged = |error: &dyn std::fmt::Display| {
             Problem::internal(format_args!("the score of game {}: {error}", game.id))
         };
-        let score: GameScore =
-            serde_json::from_value(played_row.score.clone()).map_err(|error| damaged(&error))?;
+        let score: GameScore = serde_json::from_value(stored_result.results.clone())
+            .map_err(|error| damaged(&error))?;
         let [home, away] = game.teams;
         // A test or friendly game belongs to no round; it is scored like a game of the first round.
         let schedule_entry = game.purpose.schedule_entry();

@@ -91,7 +91,7 @@ impl Visibility {
     pub(crate) fn episodes_done(&self, progress: &RunProgress) -> u32 {
         match self.viewer {
             Viewer::Organiser => progress.episodes_done,
-            Viewer::Team(_) | Viewer::Visitor => progress.in_whole_shards(self.now),
+            Viewer::Team(_) | Viewer::Visitor => progress.episodes_visible_to_team(self.now),
         }
     }
 

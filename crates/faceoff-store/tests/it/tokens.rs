@@ -19,7 +19,7 @@ fn new_token(hash: u8, owner: TokenOwner, expires_at: Option<Timestamp>) -> NewT
 
 /// All tokens and sessions, the newest first.
 pub async fn all_tokens(f: &TestStore) -> Vec<Token> {
-    let listed = f.store.tokens_after(TokensOf::Everyone, None, u32::MAX);
+    let listed = f.store.tokens_after(TokenFilter::Everyone, None, u32::MAX);
     listed.await.unwrap().unwrap()
 }
 
@@ -316,9 +316,9 @@ async fn tokens_and_invitations_are_listed_page_by_page() {
     }
     let everyone = all_tokens(&f).await;
     for of in [
-        TokensOf::Everyone,
-        TokensOf::User(ada.id),
-        TokensOf::Member(ada.id, teams[0]),
+        TokenFilter::Everyone,
+        TokenFilter::User(ada.id),
+        TokenFilter::Member(ada.id, teams[0]),
     ] {
         let expected: Vec<TokenId> = everyone
             .iter()
@@ -339,7 +339,7 @@ async fn tokens_and_invitations_are_listed_page_by_page() {
         assert_eq!(found, expected, "{of:?}");
     }
     // A token of another team, and one that does not exist.
-    let of_alpha = TokensOf::Member(ada.id, teams[0]);
+    let of_alpha = TokenFilter::Member(ada.id, teams[0]);
     for after in [created[1].id, TokenId::new()] {
         let page = f
             .store

@@ -136,7 +136,7 @@ pub async fn commit(
         _ => Some(store_files(site, claim, game).await),
     };
     let commit = GameCommit {
-        score: outcome.score([&team_names[0], &team_names[1]], seed),
+        results: outcome.score([&team_names[0], &team_names[1]], seed),
         recording,
         logs: team_names.map(|name| format!("{name} was here\n")),
     };
