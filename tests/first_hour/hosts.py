@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Evaluates an own agent as an ordinary user on hosts that lack something. On each of them `faceoff eval` runs, with one line that names
-the missing layers of the sandbox, refuses another team's archive without namespaces, and `faceoff doctor` gives the cure of the cause.
+the missing layers of the sandbox, refuses another team's archive without namespaces, and `faceoff doctor` gives the fix of the cause.
 
 It needs root and debootstrap.
 """
@@ -55,7 +55,7 @@ class Host:
 
     name: str
     # Part of what doctor recommends; empty if nothing is wrong.
-    cure: str
+    fix: str
     # Commands of root that make the host so.
     setup: str = ":"
     # Program through which the user's commands are started.
@@ -73,7 +73,7 @@ HOSTS = [
     ),
     Host("no control groups", "mount -t cgroup2", "umount -l /sys/fs/cgroup"),
     Host(
-        # The cure depends on whether the user may enter the folder that an earlier server has left.
+        # The fix depends on whether the user may enter the folder that an earlier server has left.
         "read-only /sys",
         "",
         """awk '$5 ~ "^/sys" { print $5 }' /proc/self/mountinfo | while read -r point; do mount -o remount,bind,ro "$point"; done""",
@@ -139,9 +139,9 @@ def problems(host: Host, machine: Machine) -> list[str]:
     if refused != ("namespaces" in host.missing):
         found.append(f"eval should refuse an archive only without namespaces; exit status {done.returncode}:\n{done.stdout}")
     advice = run("faceoff doctor").stdout.split("Runtimes", 1)[0]
-    if host.cure not in advice:
-        found.append(f"doctor should recommend {host.cure!r}:\n{advice}")
-    if "apt-get install bubblewrap" in advice and "apt-get install bubblewrap" not in host.cure:
+    if host.fix not in advice:
+        found.append(f"doctor should recommend {host.fix!r}:\n{advice}")
+    if "apt-get install bubblewrap" in advice and "apt-get install bubblewrap" not in host.fix:
         found.append(f"doctor should not recommend to install bubblewrap:\n{advice}")
     return found
 

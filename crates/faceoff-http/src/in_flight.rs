@@ -9,7 +9,7 @@ use axum::{
 use faceoff_api::paths::{LIVE_PATH, READY_PATH};
 use faceoff_service::{
     app::AppState,
-    places::{Places, Precedence},
+    priority_permits::{Precedence, PriorityPermits},
     problem::{Problem, ProblemKind},
 };
 use std::{
@@ -29,17 +29,17 @@ const MAX_PROBES: usize = 16;
 #[derive(Debug, Clone)]
 pub(crate) struct InFlight {
     app: Arc<AppState>,
-    places: Places,
-    /// Places of readiness probes. Anyone can send these, so they have places of their own.
-    probes: Places,
+    permits: PriorityPermits,
+    /// Of readiness probes, which anyone can send: they take no places of teams.
+    probes: PriorityPermits,
 }
 
 impl InFlight {
     pub(crate) fn new(app: &Arc<AppState>) -> Self {
         Self {
             app: Arc::clone(app),
-            places: Places::new(app.config.limits.requests),
-            probes: Places::new(MAX_PROBES),
+            permits: PriorityPermits::new(app.config.limits.requests),
+            probes: PriorityPermits::new(MAX_PROBES),
         }
     }
 
@@ -69,21 +69,21 @@ pub(crate) async fn limit(
     if request.uri().path() == READY_PATH {
         let probe = in_flight.probes.take(Precedence::Organiser);
         // A server that has no place even for organisers is not ready.
-        let is_full = in_flight.places.take(Precedence::Organiser).is_none();
+        let is_full = in_flight.permits.take(Precedence::Organiser).is_none();
         if probe.is_none() || is_full {
             return in_flight.refuse("in_flight");
         }
         return next.run(request).await;
     }
     let precedence = in_flight.app.precedence(request.headers());
-    let Some(_place) = in_flight.places.take(precedence) else {
+    let Some(_permit) = in_flight.permits.take(precedence) else {
         return in_flight.refuse("in_flight");
     };
     if request.method().is_safe() && precedence == Precedence::Visitor {
         // The runtime polls all other ready tasks before this one continues, so the elapsed time is the delay that they cause.
         let yielded_at = Instant::now();
         tokio::task::yield_now().await;
-        if yielded_at.elapsed() > MAX_WAIT && in_flight.places.taken() >= MIN_CROWDED_REQUESTS {
+        if yielded_at.elapsed() > MAX_WAIT && in_flight.permits.taken() >= MIN_CROWDED_REQUESTS {
             return in_flight.refuse("late");
         }
     }

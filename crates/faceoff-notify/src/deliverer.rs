@@ -241,7 +241,7 @@ impl Deliverer {
     async fn send(&self, url: &str, delivery: Delivery) {
         let now = self.clock.now();
         let recorded = async {
-            let secrets = self.store.webhook_keys(delivery.webhook, now).await?;
+            let secrets = self.store.webhook_secrets(delivery.webhook, now).await?;
             let (attempt, outcome) = self.sender.send(url, &secrets, &delivery, now).await;
             self.store
                 .record_attempt(delivery.id, attempt, outcome)

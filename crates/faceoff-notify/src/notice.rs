@@ -59,7 +59,7 @@ impl Notice {
     fn is_own(&self, own_team: TeamId) -> bool {
         match self.context {
             // Platform faults are visible to organisers only.
-            _ if matches!(self.event, Event::JobReturned { .. }) => false,
+            _ if matches!(self.event, Event::JobFailed { .. }) => false,
             SubjectContext::Team(team)
             | SubjectContext::Submission { team, .. }
             | SubjectContext::Ablation { team, .. }
@@ -70,9 +70,7 @@ impl Notice {
             SubjectContext::User { team } => {
                 let is_membership = matches!(
                     self.event,
-                    Event::PersonJoined { .. }
-                        | Event::PersonRenamed { .. }
-                        | Event::PersonLeft { .. }
+                    Event::UserJoined { .. } | Event::UserRenamed { .. } | Event::UserLeft { .. }
                 );
                 is_membership && team == Some(own_team)
             }
@@ -103,7 +101,7 @@ impl Notice {
             }
             // The page of a public game shows everything but platform faults.
             SubjectContext::Game { is_public, .. } => {
-                is_public && !matches!(self.event, Event::JobReturned { .. })
+                is_public && !matches!(self.event, Event::JobFailed { .. })
             }
             SubjectContext::Question { .. } => {
                 matches!(self.event, Event::Answered { public: true })
@@ -144,7 +142,7 @@ impl Notice {
             (Event::TeamsEntered { teams } | Event::TournamentOpened { teams, .. }, _) => {
                 teams.clone()
             }
-            (Event::TeamOut { team, .. } | Event::TeamLeftTournament { team, .. }, _)
+            (Event::EntrantRemoved { team, .. } | Event::TeamLeftTournament { team, .. }, _)
             | (Event::RegistrationApproved { team }, _)
             | (_, SubjectContext::Team(team))
             | (_, SubjectContext::Submission { team, .. })

@@ -151,16 +151,16 @@ const fn changes_queue(event: &Event) -> bool {
             | Event::ProposalPlayed
             | Event::ProposalDropped
             | Event::ShardCommitted { .. }
-            | Event::JobReturned { .. }
+            | Event::JobFailed { .. }
             | Event::RoundStarted { .. }
-            | Event::ReplaysOrdered { .. }
-            | Event::ReplaysCancelled { .. }
+            | Event::ScheduleReplaysRequested { .. }
+            | Event::ScheduleReplaysCancelled { .. }
             | Event::TournamentPaused { .. }
             | Event::TournamentResumed
-            | Event::FreeGameQueued { .. }
+            | Event::TestOrFriendlyGameQueued { .. }
             | Event::GameBegun { .. }
             | Event::GamePlayed { .. }
-            | Event::GameBroken { .. }
+            | Event::GamePlatformFailed { .. }
             | Event::GameQueuedAgain
             | Event::GameCancelled { .. }
     )

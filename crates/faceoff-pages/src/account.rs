@@ -18,7 +18,7 @@ use faceoff_service::{
     auth::OptionalCaller,
     views::{token, user as user_view},
 };
-use faceoff_store::TokensOf;
+use faceoff_store::TokenFilter;
 use jiff::Timestamp;
 
 /// Number of tokens and sessions of which the ended ones are listed, the newest ones.
@@ -52,7 +52,7 @@ pub(super) async fn page(
     }) else {
         return Ok(Redirect::to("/sign-in?next=%2Faccount").into_response());
     };
-    let (own, now) = (TokensOf::User(user.id), app.config.clock.now());
+    let (own, now) = (TokenFilter::User(user.id), app.config.clock.now());
     let mut tokens = app.store.valid_tokens(own, now).await?;
     let newest = app.store.tokens_after(own, None, MAX_LISTED).await?;
     let newest = newest.into_iter().flatten();

@@ -76,9 +76,9 @@ struct ChampionShares {
 impl Page {
     /// The next step, without the reason of a pause if results are hidden: it is free text.
     fn next_step(&self) -> &str {
-        match self.spoilers.hides_results() && self.view.head.paused.is_some() {
+        match self.spoilers.hides_results() && self.view.summary.paused.is_some() {
             true => "The tournament is paused; no games start.",
-            false => &self.view.head.next,
+            false => &self.view.summary.next,
         }
     }
 
@@ -139,9 +139,9 @@ pub(super) async fn page(
             .await?
             .with_address(&app, &format!("/tournaments/{id}")),
         id,
-        phase: tournament_text::phase_label(&view.head),
+        phase: tournament_text::phase_label(&view.summary),
         format: tournament_text::describe_format(&view.rules),
-        is_final: view.head.champion.is_some(),
+        is_final: view.summary.champion.is_some(),
         running: visible
             .iter()
             .filter(|game| game.is_running())
@@ -170,7 +170,7 @@ pub(super) async fn page(
 }
 
 async fn ratings_section(app: &App, view: &TournamentView) -> Result<RatingsSection, Problem> {
-    let rated = match ratings(app, view.head.id).await {
+    let rated = match ratings(app, view.summary.id).await {
         Err(problem) if problem.kind() == ProblemKind::Conflict => {
             return Ok(RatingsSection::None(problem.detail().to_owned()));
         }

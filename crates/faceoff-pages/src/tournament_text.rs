@@ -1,19 +1,19 @@
 //! Tournaments as text.
 
 use super::format;
-use faceoff_api::views::tournament::{TournamentHead, TournamentPhase};
+use faceoff_api::views::tournament::{TournamentPhase, TournamentSummary};
 use faceoff_replay::model::CONTROL_STEP_S;
 use faceoff_types::{DepartureKind, RoundNumber, TournamentFormat, TournamentRules};
 
-pub(super) fn phase_label(head: &TournamentHead) -> String {
-    let phase = match head.phase {
+pub(super) fn phase_label(summary: &TournamentSummary) -> String {
+    let phase = match summary.phase {
         TournamentPhase::Open => "open, no round started yet",
         TournamentPhase::Round => "round in progress",
         TournamentPhase::Between => "between rounds",
         TournamentPhase::Played => "all rounds played",
         TournamentPhase::Closed => "closed",
     };
-    match (&head.paused, head.phase) {
+    match (&summary.paused, summary.phase) {
         (Some(_), state) if state != TournamentPhase::Closed => format!("{phase}, paused"),
         _ => phase.to_owned(),
     }

@@ -7,11 +7,11 @@ use super::{
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
-use faceoff_api::views::tournament::TournamentHead;
+use faceoff_api::views::tournament::TournamentSummary;
 use faceoff_service::{app::App, views::tournament};
 
 struct Row {
-    head: TournamentHead,
+    summary: TournamentSummary,
     phase: String,
 }
 
@@ -26,9 +26,9 @@ struct Page {
 impl Page {
     /// The next step of a tournament, without the reason of a pause if results are hidden: it is free text.
     fn next_step<'a>(&self, row: &'a Row) -> &'a str {
-        match self.spoilers.hides_results() && row.head.paused.is_some() {
+        match self.spoilers.hides_results() && row.summary.paused.is_some() {
             true => "The tournament is paused; no games start.",
-            false => &row.head.next,
+            false => &row.summary.next,
         }
     }
 }
@@ -37,15 +37,15 @@ pub(super) async fn page(
     State(app): State<App>,
     spoilers: Spoilers,
 ) -> Result<Response, PageProblem> {
-    let mut heads = tournament::heads(&app).await?;
-    heads.reverse();
+    let mut summaries = tournament::summaries(&app).await?;
+    summaries.reverse();
     render(&Page {
         frame: Frame::load(&app, "/tournaments").await?,
-        rows: heads
+        rows: summaries
             .into_iter()
-            .map(|head| Row {
-                phase: tournament_text::phase_label(&head),
-                head,
+            .map(|summary| Row {
+                phase: tournament_text::phase_label(&summary),
+                summary,
             })
             .collect(),
         spoilers,

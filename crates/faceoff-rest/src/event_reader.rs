@@ -4,7 +4,9 @@
 use crate::sse::is_still_valid;
 use axum::response::sse::Event;
 use faceoff_notify::{Audience, Notice, NoticeFilter, Page};
-use faceoff_service::{app::App, places::Place, problem::Problem, shutdown::Shutdown};
+use faceoff_service::{
+    app::App, priority_permits::PriorityPermit, problem::Problem, shutdown::Shutdown,
+};
 use faceoff_store::{Change, Requester};
 use std::time::Duration;
 use tokio::{
@@ -50,7 +52,7 @@ pub(crate) struct EventReader {
     /// When the stream ends.
     ends_at: Instant,
     shutdown: Option<Shutdown>,
-    _place: Place,
+    _permit: PriorityPermit,
 }
 
 impl EventReader {
@@ -60,7 +62,7 @@ impl EventReader {
         subscription: Subscription,
         last_received: Option<i64>,
         shutdown: Option<Shutdown>,
-        place: Place,
+        permit: PriorityPermit,
     ) -> Result<Self, Problem> {
         // Subscribed before the log is read, so that no event is missed.
         let changes = app.store.events();
@@ -81,7 +83,7 @@ impl EventReader {
             next_read_at: now,
             ends_at: now + MAX_DURATION,
             shutdown,
-            _place: place,
+            _permit: permit,
         })
     }
 

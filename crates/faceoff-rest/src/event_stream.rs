@@ -1,6 +1,6 @@
 //! The event stream: changes of the season as server-sent events.
 
-use super::sse::{LAST_EVENT_ID, sse_response, take_place};
+use super::sse::{LAST_EVENT_ID, sse_response, take_permit};
 use crate::event_reader::{EventReader, Subscription};
 use axum::{Extension, extract::State, http::HeaderMap, response::IntoResponse};
 use faceoff_api::requests::EventStreamQuery;
@@ -53,7 +53,7 @@ pub(crate) async fn follow_events(
         .get(LAST_EVENT_ID)
         .map(|value| parse_id(value.to_str().unwrap_or_default()))
         .transpose()?;
-    let place = take_place(
+    let permit = take_permit(
         &app.event_readers,
         caller.as_ref(),
         "the event stream",
@@ -66,7 +66,7 @@ pub(crate) async fn follow_events(
         filter,
     };
     let shutdown = shutdown.map(|Extension(shutdown)| shutdown);
-    let reader = EventReader::open(app, subscription, last_received, shutdown, place).await?;
+    let reader = EventReader::open(app, subscription, last_received, shutdown, permit).await?;
     let batches = stream::unfold(reader, |mut reader| async {
         let batch = reader.next().await?;
         Some((batch, reader))

@@ -149,7 +149,7 @@ pub(crate) async fn side_log(
     let (id, side) = parse_side(&path)?;
     let viewer = Viewer::new(&caller);
     let (state, game) = game::find_visible(&app, viewer, id).await?;
-    if !state.visibility(viewer).is_own(&game, side) {
+    if !state.visibility(viewer).has_team_access(&game, side) {
         return Err(Problem::new(
             ProblemKind::Forbidden,
             format!(
@@ -234,7 +234,7 @@ impl StoredRecording {
         let visibility = state.visibility(viewer);
         let is_own = match file {
             GameFile::BothSides => false,
-            GameFile::Side(side) => visibility.is_own(&game, side),
+            GameFile::Side(side) => visibility.has_team_access(&game, side),
         };
         if !is_own && !visibility.can_see_both_sides(&game) {
             let description = match file {

@@ -1,6 +1,6 @@
 //! The stream of a live game: positions, goals and fouls as server-sent events while it is played.
 
-use super::sse::{LAST_EVENT_ID, sse_response, take_place};
+use super::sse::{LAST_EVENT_ID, sse_response, take_permit};
 use crate::live_reader::{LiveReader, parse_cursor};
 use axum::{Extension, extract::State, http::HeaderMap, response::IntoResponse};
 use faceoff_service::{
@@ -46,10 +46,10 @@ pub(crate) async fn watch_game(
         .map(|value| parse_cursor(value.to_str().unwrap_or_default()))
         .transpose()?;
     let polled = format!("GET /api/v1/games/{id}");
-    let place = take_place(&app.live_readers, caller.as_ref(), "live games", &polled)?;
+    let permit = take_permit(&app.live_readers, caller.as_ref(), "live games", &polled)?;
     let shutdown = shutdown.map(|Extension(shutdown)| shutdown);
     let requester = caller.map(|caller| caller.requester());
-    let reader = LiveReader::new(app, id, requester, last_event_id, shutdown, place);
+    let reader = LiveReader::new(app, id, requester, last_event_id, shutdown, permit);
     let batches = stream::unfold(reader, |mut reader| async {
         let batch = reader.next().await?;
         Some((batch, reader))

@@ -7,7 +7,7 @@ use faceoff_api::views::live::{LiveEnd, LiveEndState, LiveWait};
 use faceoff_live::{LiveCursor, LiveSubscription, LiveUpdate};
 use faceoff_service::{
     app::App,
-    places::Place,
+    priority_permits::PriorityPermit,
     problem::{Problem, ProblemKind},
     shutdown::Shutdown,
 };
@@ -51,7 +51,7 @@ pub(crate) struct LiveReader {
     /// When the stream ends, even if the game has not.
     ends_at: Instant,
     shutdown: Option<Shutdown>,
-    _place: Place,
+    _permit: PriorityPermit,
 }
 
 /// State of a game in the database.
@@ -68,7 +68,7 @@ impl LiveReader {
         requester: Option<Requester>,
         cursor: Option<LiveCursor>,
         shutdown: Option<Shutdown>,
-        place: Place,
+        permit: PriorityPermit,
     ) -> Self {
         let now = Instant::now();
         Self {
@@ -85,7 +85,7 @@ impl LiveReader {
             next_batch_at: now,
             ends_at: now + MAX_DURATION,
             shutdown,
-            _place: place,
+            _permit: permit,
         }
     }
 
@@ -283,7 +283,7 @@ impl LiveReader {
             return Ok(None);
         };
         let score: faceoff_scoring::tournament::GameScore =
-            serde_json::from_value(result.score).map_err(Problem::internal)?;
+            serde_json::from_value(result.results).map_err(Problem::internal)?;
         Ok(Some(LiveGame {
             game: self.game,
             attempt: result.attempt,

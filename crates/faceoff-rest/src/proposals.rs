@@ -110,7 +110,7 @@ pub(crate) async fn propose(
             Reevaluation::Evaluation(evaluation)
         }
         (None, Some(day), false) => Reevaluation::Day(stage_day(day)),
-        (None, Some(day), true) => Reevaluation::Rules(stage_day(day)),
+        (None, Some(day), true) => Reevaluation::DayWithNewestRules(stage_day(day)),
         (Some(_), _, true) => {
             let detail = "expected “day” with new rules, got “evaluation”; name the “day”, and leave out “evaluation”";
             return Err(Problem::invalid("new_rules", detail));

@@ -10,7 +10,7 @@ use axum::{
 use faceoff_service::{
     app::App,
     auth::Caller,
-    places::{Place, Places, Precedence},
+    priority_permits::{Precedence, PriorityPermit, PriorityPermits},
     problem::{Problem, ProblemKind},
 };
 use faceoff_store::Requester;
@@ -36,13 +36,13 @@ pub(super) async fn is_still_valid(
     }
 }
 
-/// Takes a place for the reader of a stream. The message of a refusal says what can be polled instead.
-pub(super) fn take_place(
-    readers: &Places,
+/// Takes a permit for the reader of a stream. The message of a refusal says what can be polled instead.
+pub(super) fn take_permit(
+    readers: &PriorityPermits,
     caller: Option<&Caller>,
     stream: &str,
     polled: &str,
-) -> Result<Place, Problem> {
+) -> Result<PriorityPermit, Problem> {
     let precedence = caller.map_or(Precedence::Visitor, Caller::precedence);
     readers.take(precedence).ok_or_else(|| {
         let (taken, max) = (readers.taken(), readers.max());

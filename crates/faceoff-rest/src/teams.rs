@@ -136,7 +136,7 @@ pub(crate) async fn retire_team(
     PathParam(id): PathParam<TeamId>,
     Body(Confirmation { confirm }): Body<Confirmation>,
 ) -> Result<Json<TeamView>, Problem> {
-    let team = teams::find_own(&app, &caller, id).await?;
+    let team = teams::find_editable(&app, &caller, id).await?;
     let effect = format!(
         "{} can neither upload nor be evaluated from now on; evaluations whose cutoff has passed continue, and its results \
          stay",
@@ -164,7 +164,7 @@ pub(crate) async fn return_team(
     State(app): State<App>,
     PathParam(id): PathParam<TeamId>,
 ) -> Result<Json<TeamView>, Problem> {
-    teams::find_own(&app, &caller, id).await?;
+    teams::find_editable(&app, &caller, id).await?;
     let now = app.config.clock.now();
     let team = app.store.return_team(caller.actor(), id, now).await?;
     tracing::info!(team = %team.name, %id, actor = %caller.actor(), "team returned");

@@ -9,7 +9,7 @@ use axum::{
 use faceoff_api::{
     paths,
     requests::{Confirmation, NewTournament, Reason, TournamentChange},
-    views::tournament::{TournamentHead, TournamentView},
+    views::tournament::{TournamentSummary, TournamentView},
 };
 use faceoff_service::{
     app::App,
@@ -23,12 +23,12 @@ use faceoff_types::TournamentId;
 
 /// Lists all tournaments, in order of creation.
 #[utoipa::path(
-    get, path = "/tournaments", tag = "public", responses((status = 200, body = Vec<TournamentHead>))
+    get, path = "/tournaments", tag = "public", responses((status = 200, body = Vec<TournamentSummary>))
 )]
 pub(crate) async fn list_tournaments(
     State(app): State<App>,
-) -> Result<Json<Vec<TournamentHead>>, Problem> {
-    tournament::heads(&app).await.map(Json)
+) -> Result<Json<Vec<TournamentSummary>>, Problem> {
+    tournament::summaries(&app).await.map(Json)
 }
 
 /// Returns a tournament: rules, entrants, rounds and standings.

@@ -16,7 +16,7 @@ const MAX_TOTAL_BYTES: usize = 256 << 10;
 /// Refuses an empty command, arguments or variables that no program can be given, and a program of the bundle
 /// that is missing, not executable or of another system. A program of the runtime is looked up inside the sandbox only.
 ///
-/// Returns what the start of the program needs, for the error if it fails.
+/// Returns what may be missing for the start of the program, for the error if it fails.
 pub(crate) fn check_command(
     bundle_dir: &Path,
     command: &[String],
@@ -52,7 +52,7 @@ pub(crate) fn check_command(
         None if program.starts_with('/') => return Ok(None),
         None if !program.contains('/') => {
             let search_path = env.get("PATH").unwrap_or(&runtime.path);
-            return Ok(runtime.missing_program(program, search_path));
+            return Ok(runtime.reason_program_is_missing(program, search_path));
         }
         None => program.as_str(),
     };
@@ -79,7 +79,7 @@ pub(crate) fn check_command(
     }
     match ProgramFile::read(bundle_dir, path_in_bundle) {
         Some(ProgramFile::Unusable(reason)) => refuse(format!("`{program}` {reason}")),
-        Some(ProgramFile::Needs(needs)) => Ok(needs),
+        Some(ProgramFile::MayStart(hint)) => Ok(hint),
         None => Ok(None),
     }
 }

@@ -1,8 +1,8 @@
 //! The agent's network namespace, in which nothing of the host's network shows.
 //!
 //! bubblewrap could make the namespace as well. But files of `/proc/PID/net` show counters of the whole host, such as the number of its
-//! connections and packets, which visitors move. Files of one namespace have one mode for all processes. So the child, while it is still
-//! root, makes the namespace and closes its files to others.
+//! connections and packets, which visitors change. Files of one namespace have one mode for all processes. So the child, while it is still
+//! root, makes the namespace and removes all permissions of its files.
 
 use crate::{SandboxError, error::IoContext};
 use rustix::{
@@ -20,7 +20,7 @@ use std::{
 
 const FOLDER: &str = "/proc/self/net";
 /// Files that show the namespace's own state only, and that programs read to list interfaces.
-const OPEN_FILES: [&str; 4] = ["dev", "if_inet6", "ipv6_route", "route"];
+const READABLE_FILES: [&str; 4] = ["dev", "if_inet6", "ipv6_route", "route"];
 
 /// Buffers of a connection: least, usual and most bytes. All networks of the host share the memory for them.
 const BUFFER_LIMITS: &[(&CStr, &[u8])] = &[
@@ -31,13 +31,13 @@ const BUFFER_LIMITS: &[(&CStr, &[u8])] = &[
 /// The network of one agent.
 #[derive(Debug)]
 pub(crate) struct PrivateNetwork {
-    closed_files: Vec<CString>,
+    hidden_files: Vec<CString>,
 }
 
 impl PrivateNetwork {
     pub(crate) fn new() -> Result<Self, SandboxError> {
         Ok(Self {
-            closed_files: closed_files().context(format_args!("cannot read {FOLDER}"))?,
+            hidden_files: hidden_files().context(format_args!("cannot read {FOLDER}"))?,
         })
     }
 
@@ -57,7 +57,7 @@ impl PrivateNetwork {
             let file = open(*setting, OFlags::WRONLY | OFlags::CLOEXEC, Mode::empty());
             let _ = file.and_then(|file| write(&file, value));
         }
-        for file in &self.closed_files {
+        for file in &self.hidden_files {
             match chmodat(CWD, file, Mode::empty(), AtFlags::empty()) {
                 // A module of the kernel may have been loaded or unloaded since the names were read.
                 Ok(()) | Err(Errno::NOENT) => {}
@@ -92,12 +92,12 @@ fn start_loopback() -> Result<(), Errno> {
     Err(Errno::from_io_error(&error).unwrap_or(Errno::INVAL))
 }
 
-/// Paths of the files and folders to close.
-fn closed_files() -> io::Result<Vec<CString>> {
+/// Paths of the files and folders whose permissions are removed.
+fn hidden_files() -> io::Result<Vec<CString>> {
     let mut files = Vec::new();
     for entry in fs::read_dir(FOLDER)? {
         let entry = entry?;
-        if OPEN_FILES.iter().any(|open| entry.file_name() == *open) {
+        if READABLE_FILES.iter().any(|name| entry.file_name() == *name) {
             continue;
         }
         let path = entry.path();

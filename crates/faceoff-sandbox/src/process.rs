@@ -40,8 +40,8 @@ pub struct AgentProcess {
     /// The threads whose scheduling counters are read.
     threads: TrackedThreads,
     is_frozen: bool,
-    /// What the start of the program needs, for the error if it fails.
-    start_needs: Option<String>,
+    /// What may be missing for the start of the program, for the error if it fails.
+    start_hint: Option<String>,
     end: Option<ExitCause>,
 }
 
@@ -76,7 +76,7 @@ impl AgentProcess {
             "cannot find the bundle {}",
             spec.bundle_dir.display()
         ))?;
-        let start_needs = check_command(&bundle_dir, &spec.command, &spec.env, &spec.runtime)
+        let start_hint = check_command(&bundle_dir, &spec.command, &spec.env, &spec.runtime)
             .map_err(SpawnError::Agent)?;
         let spec = SpawnSpec {
             bundle_dir,
@@ -90,9 +90,7 @@ impl AgentProcess {
         } = Launch::new(&spec)?
             .start(&spec)
             .map_err(|error| match error {
-                SpawnError::Agent(fault) => {
-                    SpawnError::Agent(with_start_needs(fault, &start_needs))
-                }
+                SpawnError::Agent(fault) => SpawnError::Agent(with_start_hint(fault, &start_hint)),
                 platform => platform,
             })?;
         Ok(Self {
@@ -104,7 +102,7 @@ impl AgentProcess {
             output_poll: PollInterval::start(Instant::now()),
             threads: TrackedThreads::default(),
             is_frozen: false,
-            start_needs,
+            start_hint,
             end: None,
         })
     }
@@ -420,7 +418,7 @@ impl AgentProcess {
             };
             self.end = Some(match report.cause() {
                 ExitCause::Agent(fault) => {
-                    ExitCause::Agent(with_start_needs(fault, &self.start_needs))
+                    ExitCause::Agent(with_start_hint(fault, &self.start_hint))
                 }
                 other => other,
             });
@@ -429,11 +427,11 @@ impl AgentProcess {
     }
 }
 
-/// Adds to the fault of a failed start what the start needs.
-fn with_start_needs(fault: AgentFaultKind, start_needs: &Option<String>) -> AgentFaultKind {
-    match (fault, start_needs) {
-        (AgentFaultKind::CannotStart { detail }, Some(needs)) => AgentFaultKind::CannotStart {
-            detail: format!("{detail}; {needs}"),
+/// Adds to the fault of a failed start what may be missing.
+fn with_start_hint(fault: AgentFaultKind, start_hint: &Option<String>) -> AgentFaultKind {
+    match (fault, start_hint) {
+        (AgentFaultKind::CannotStart { detail }, Some(hint)) => AgentFaultKind::CannotStart {
+            detail: format!("{detail}; {hint}"),
         },
         (fault, _) => fault,
     }

@@ -109,11 +109,11 @@ impl ProcessTree {
         self.status.is_some()
     }
 
-    /// All processes of the tree that can be found.
+    /// The processes of the tree that can be found; without a cgroup, those besides the child itself.
     pub(crate) fn processes(&self) -> Vec<Pid> {
         match &self.cgroup {
             Some(cgroup) => cgroup.processes(),
-            None => relatives(self.pid()),
+            None => group_and_descendants(self.pid()),
         }
     }
 
@@ -128,7 +128,7 @@ impl ProcessTree {
             && wait_for(self.child_pidfd.as_fd(), PollFlags::IN, deadline)?
         {
             // The child is not reaped yet, so its pid and its process group id cannot have been reused.
-            self.kill_relatives();
+            self.kill_group_and_descendants();
             self.exit_status = Some(self.child.wait()?);
             self.end_sandbox();
         }
@@ -169,7 +169,7 @@ impl ProcessTree {
                 return;
             }
         }
-        self.kill_relatives();
+        self.kill_group_and_descendants();
         let _ = self.child.kill();
         self.thaw();
         if !matches!(self.wait(Instant::now() + KILL_TIMEOUT), Ok(Some(_))) {
@@ -201,11 +201,11 @@ impl ProcessTree {
 
     /// Kills the child's process group and descendants, and waits for their end; the child itself is not reaped. Does
     /// nothing with a sandbox, where the end of the first process terminates all others.
-    fn kill_relatives(&self) {
+    fn kill_group_and_descendants(&self) {
         if self.is_sandboxed() {
             return;
         }
-        let pidfds: Vec<_> = relatives(self.pid())
+        let pidfds: Vec<_> = group_and_descendants(self.pid())
             .into_iter()
             .filter_map(|pid| pidfd_open(pid, PidfdFlags::empty()).ok())
             .collect();
@@ -257,7 +257,7 @@ fn parent_and_group(pid: i32) -> Option<(i32, i32)> {
 
 /// The other members of `root`'s process group, and all descendants that are still linked to it, without `root`
 /// itself.
-fn relatives(root: Pid) -> Vec<Pid> {
+fn group_and_descendants(root: Pid) -> Vec<Pid> {
     let root = root.as_raw_nonzero().get();
     let entries = fs::read_dir("/proc").into_iter().flatten().flatten();
     let all: Vec<_> = entries

@@ -23,8 +23,8 @@ const HOST_MACHINE: u16 = 183;
 pub(crate) enum ProgramFile {
     /// It cannot run on this host; the text says why.
     Unusable(String),
-    /// It needs this file of the runtime, if any; the text says which, and what to do if it is missing.
-    Needs(Option<String>),
+    /// It may start. The text names the file of the runtime that it needs, if any, and what to do if that is missing.
+    MayStart(Option<String>),
 }
 
 impl ProgramFile {
@@ -49,7 +49,7 @@ impl ProgramFile {
             [0xef, 0xbb, 0xbf, b'#', b'!', ..] => unusable(
                 "begins with a byte order mark, so its line `#!` is not recognised; save it as UTF-8 without a byte order mark",
             ),
-            _ => Self::Needs(None),
+            _ => Self::MayStart(None),
         }
     }
 }
@@ -72,7 +72,7 @@ fn script(line: &[u8]) -> ProgramFile {
     let mut words = line
         .split(|byte| matches!(byte, b' ' | b'\t'))
         .filter(|word| !word.is_empty());
-    ProgramFile::Needs(words.next().map(|interpreter| {
+    ProgramFile::MayStart(words.next().map(|interpreter| {
         let interpreter = quoted(interpreter);
         format!(
             "it is a script for {interpreter}, which must exist where the agent runs; name an interpreter of the runtime in `command`, such \
@@ -107,7 +107,7 @@ fn elf(head: &[u8]) -> ProgramFile {
             std::env::consts::ARCH
         ));
     }
-    ProgramFile::Needs(loader(head).map(|loader| {
+    ProgramFile::MayStart(loader(head).map(|loader| {
         let loader = quoted(loader);
         let library = if loader.contains("musl") {
             "musl, another C library than the runtime's"
@@ -176,7 +176,7 @@ mod tests {
 
     fn expect_needs(head: &[u8], words: &str) {
         match ProgramFile::from_head(head) {
-            ProgramFile::Needs(Some(text)) => assert!(text.contains(words), "{text}"),
+            ProgramFile::MayStart(Some(text)) => assert!(text.contains(words), "{text}"),
             other => panic!("{head:?}: {other:?}"),
         }
     }
@@ -223,7 +223,7 @@ mod tests {
         let mut without_loader = elf_file(HOST_MACHINE, b"");
         without_loader[56] = 0;
         for head in [&without_loader as &[u8], b"", b"#!", b"#!\n", b"hello"] {
-            assert_eq!(ProgramFile::from_head(head), ProgramFile::Needs(None));
+            assert_eq!(ProgramFile::from_head(head), ProgramFile::MayStart(None));
         }
     }
 
@@ -254,7 +254,10 @@ mod tests {
         }
         for path in ["agent", "inner"] {
             let read = ProgramFile::read(&bundle, path);
-            assert!(matches!(read, Some(ProgramFile::Needs(Some(_)))), "{path}");
+            assert!(
+                matches!(read, Some(ProgramFile::MayStart(Some(_)))),
+                "{path}"
+            );
         }
     }
 }

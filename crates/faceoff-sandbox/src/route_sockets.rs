@@ -1,6 +1,6 @@
 //! Sockets of `NETLINK_ROUTE` for agents, by which programs list network interfaces.
 //!
-//! Such a socket also shows counters of the neighbour tables of all networks of the host, which any agent can move. So the service makes
+//! Such a socket also shows counters of the neighbour tables of all networks of the host, which any agent can change. So the service makes
 //! the socket, in the agent's network, with a filter that passes answers about interfaces and addresses only, and that the agent cannot
 //! take off.
 
@@ -21,25 +21,29 @@ const ANSWERS: [libc::c_int; 4] = [
 
 /// Makes a socket in the network of the process to which this thread belongs; `never_blocks`: as by `SOCK_NONBLOCK`.
 pub(crate) fn make(caller: Caller<'_>, never_blocks: bool) -> io::Result<OwnedFd> {
-    let network = caller.open("ns/net")?;
+    let network_namespace = caller.open("ns/net")?;
     // The network belongs to the agent's user namespace, unless a root service has made it.
-    let users = if rustix::process::geteuid().is_root() {
+    let user_namespace = if rustix::process::geteuid().is_root() {
         None
     } else {
         Some(caller.open("ns/user")?)
     };
     let flags = if never_blocks { libc::SOCK_NONBLOCK } else { 0 };
     let kind = libc::SOCK_RAW | libc::SOCK_CLOEXEC | flags;
-    let socket = make_in(network.as_fd(), users.as_ref().map(AsFd::as_fd), kind)?;
+    let socket = make_in(
+        network_namespace.as_fd(),
+        user_namespace.as_ref().map(AsFd::as_fd),
+        kind,
+    )?;
     attach_filter(&socket)?;
     Ok(socket)
 }
 
 /// What the process below needs, and its result.
-struct Task {
-    network: libc::c_int,
-    /// -1: it stays where it is.
-    users: libc::c_int,
+struct SocketRequest {
+    network_namespace: libc::c_int,
+    /// File descriptor of the user namespace to enter; -1: the process stays in its own.
+    user_namespace: libc::c_int,
     kind: libc::c_int,
     /// The socket, or a negative error.
     result: libc::c_int,
@@ -47,33 +51,34 @@ struct Task {
 
 /// Makes the socket in a process of its own that shares this one's open files: entering a user namespace takes a process with one thread.
 fn make_in(
-    network: BorrowedFd<'_>,
-    users: Option<BorrowedFd<'_>>,
+    network_namespace: BorrowedFd<'_>,
+    user_namespace: Option<BorrowedFd<'_>>,
     kind: libc::c_int,
 ) -> io::Result<OwnedFd> {
     const STACK_BYTES: usize = 16 << 10;
-    extern "C" fn run(task: *mut libc::c_void) -> libc::c_int {
+    extern "C" fn run(request: *mut libc::c_void) -> libc::c_int {
         #[expect(unsafe_code, reason = "rustix's functions are not callable from here")]
-        // SAFETY: the caller's task outlives this process, for whose end it waits. The calls take numbers and neither allocate nor lock.
+        // SAFETY: the caller's request outlives this process, for whose end it waits. The calls take numbers and neither allocate nor
+        // lock.
         unsafe {
-            let task = &mut *task.cast::<Task>();
+            let request = &mut *request.cast::<SocketRequest>();
             let enter = |namespace, kind| namespace < 0 || libc::setns(namespace, kind) == 0;
-            let is_there =
-                enter(task.users, libc::CLONE_NEWUSER) && enter(task.network, libc::CLONE_NEWNET);
-            task.result = if is_there {
-                libc::socket(libc::AF_NETLINK, task.kind, libc::NETLINK_ROUTE)
+            let has_entered = enter(request.user_namespace, libc::CLONE_NEWUSER)
+                && enter(request.network_namespace, libc::CLONE_NEWNET);
+            request.result = if has_entered {
+                libc::socket(libc::AF_NETLINK, request.kind, libc::NETLINK_ROUTE)
             } else {
                 -1
             };
-            if task.result < 0 {
-                task.result = -*libc::__errno_location();
+            if request.result < 0 {
+                request.result = -*libc::__errno_location();
             }
         }
         0
     }
-    let mut task = Task {
-        network: network.as_raw_fd(),
-        users: users.map_or(-1, |users| users.as_raw_fd()),
+    let mut request = SocketRequest {
+        network_namespace: network_namespace.as_raw_fd(),
+        user_namespace: user_namespace.map_or(-1, |user_namespace| user_namespace.as_raw_fd()),
         kind,
         result: -libc::EINVAL,
     };
@@ -86,14 +91,14 @@ fn make_in(
     // table of files and has no other owner.
     unsafe {
         let top = stack.as_mut_ptr_range().end;
-        let pid = libc::clone(run, top.cast(), flags, (&raw mut task).cast());
+        let pid = libc::clone(run, top.cast(), flags, (&raw mut request).cast());
         if pid < 0 || libc::waitpid(pid, std::ptr::null_mut(), libc::__WCLONE) != pid {
             return Err(io::Error::last_os_error());
         }
-        if task.result < 0 {
-            return Err(Errno::from_raw_os_error(-task.result).into());
+        if request.result < 0 {
+            return Err(Errno::from_raw_os_error(-request.result).into());
         }
-        Ok(OwnedFd::from_raw_fd(task.result))
+        Ok(OwnedFd::from_raw_fd(request.result))
     }
 }
 

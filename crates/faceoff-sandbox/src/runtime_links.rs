@@ -31,8 +31,8 @@ pub struct HiddenTarget {
 }
 
 impl Runtime {
-    /// Where links of this runtime lead out of it, the folder with most links first. Links to files that the host lacks, too, are left out,
-    /// and those in the system's folders of libraries, but not those of programs of the runtime that are installed there.
+    /// Targets of this runtime's links that agents do not see, the folder with most links first. Dangling links are left out. In the
+    /// system's library folders, only the folders of the runtime's own programs are searched.
     #[must_use]
     pub fn hidden_targets(&self) -> Vec<HiddenTarget> {
         let mut found: BTreeMap<PathBuf, HiddenTarget> = BTreeMap::new();
@@ -78,7 +78,11 @@ impl Runtime {
     }
 
     /// Why a program of this runtime cannot start: `search_path` has no folder with it, or it is a link that leads out of the runtime.
-    pub(crate) fn missing_program(&self, program: &str, search_path: &str) -> Option<String> {
+    pub(crate) fn reason_program_is_missing(
+        &self,
+        program: &str,
+        search_path: &str,
+    ) -> Option<String> {
         for folder in search_path.split(':') {
             if let Some(root) = self.root() {
                 if exists_in(root, &Path::new(folder).join(program)) {
@@ -153,8 +157,8 @@ fn exists_in(root: &Path, path: &Path) -> bool {
     folder.is_ok_and(|folder| openat2(folder, path, flags, Mode::empty(), within).is_ok())
 }
 
-/// The folder of a program that is installed in one of its own, as `/usr/lib/jvm/java` of `/usr/lib/jvm/java/bin/java`, by which links it
-/// may be reached.
+/// The folder in which a program is installed, if it has one of its own: `/usr/lib/jvm/java` for `/usr/lib/jvm/java/bin/java`. Links in
+/// `path` are followed.
 fn home_of_program(path: &Path) -> Option<PathBuf> {
     let program = fs::canonicalize(path).ok().filter(|path| path.is_file())?;
     let folder = program.parent()?;
@@ -205,14 +209,14 @@ mod tests {
         symlink(path("settings/one"), path("lib/elsewhere")).unwrap();
         let folder = path("lib").display().to_string();
         let reason = runtime(&["lib"])
-            .missing_program("elsewhere", &folder)
+            .reason_program_is_missing("elsewhere", &folder)
             .unwrap();
         assert!(
             reason.contains("settings/one, which agents do not see"),
             "{reason}"
         );
         let reason = runtime(&["lib"])
-            .missing_program("nothing", &folder)
+            .reason_program_is_missing("nothing", &folder)
             .unwrap();
         assert_eq!(
             reason,

@@ -145,13 +145,13 @@ const SO_PASSPIDFD: libc::c_int = 76;
 const SO_PEERPIDFD: libc::c_int = 77;
 
 /// A request of `ioctl` that is answered as for a file without it: the entropy of the host (`RNDGETENTCNT`).
-const UNKNOWN_CONTROL: u32 = 0x8004_5200;
+const UNKNOWN_IOCTL: u32 = 0x8004_5200;
 /// Types of requests that are answered in the same way: about namespaces, whose numbers are counted for the whole host, and about a file's
 /// place on the disk, or the disk itself, for all file systems (`f`), for XFS (`X`) and for Btrfs.
-const UNKNOWN_CONTROL_TYPES: [u32; 4] =
+const UNKNOWN_IOCTL_TYPES: [u32; 4] =
     [0xb7 << 8, (b'f' as u32) << 8, (b'X' as u32) << 8, 0x94 << 8];
 /// The bits of a request that are its type.
-const CONTROL_TYPE: u32 = 0xff00;
+const IOCTL_TYPE_MASK: u32 = 0xff00;
 
 #[cfg(target_arch = "x86_64")]
 const ABSENT_ON_THIS_ARCH: &[i64] = &[libc::SYS_inotify_init];
@@ -166,13 +166,13 @@ const IGNORED: &[i64] = &[libc::SYS_fadvise64, libc::SYS_readahead];
 /// Advice about mapped files that succeeds without effect, for the same reason.
 const IGNORED_ADVICE: [libc::c_int; 3] = [libc::MADV_WILLNEED, libc::MADV_COLD, libc::MADV_PAGEOUT];
 
-/// Requests of `fcntl` that are answered as if the kernel did not know them (`EINVAL`).
+/// Commands of `fcntl` that are answered as if the kernel did not know them (`EINVAL`).
 ///
 /// Ordinary locks on an agent's own files work, but no agent can see another's locks. Open file description
 /// locks are refused, since `/proc/locks` shows them to all. `F_GETLK` succeeds and leaves its argument
 /// unchanged, so every lock seems to be taken. It must not fail: SQLite queries locks this way when several
 /// processes write, and stops on an error.
-const UNKNOWN_REQUESTS: [libc::c_int; 10] = [
+const UNKNOWN_FCNTL_COMMANDS: [libc::c_int; 10] = [
     libc::F_OFD_GETLK,
     libc::F_OFD_SETLK,
     libc::F_OFD_SETLKW,
@@ -249,13 +249,13 @@ impl Filters {
         // call succeeds without effect: libraries set a buffer size and do not check it.
         let buffer_size = socket_options(&BUFFER_SIZES)?;
         ignored.insert(libc::SYS_setsockopt, buffer_size);
-        let mut unknown_requests = Rules::new();
-        unknown_requests.insert(libc::SYS_fcntl, one_of(1, &UNKNOWN_REQUESTS)?);
+        let mut invalid_argument_rules = Rules::new();
+        invalid_argument_rules.insert(libc::SYS_fcntl, one_of(1, &UNKNOWN_FCNTL_COMMANDS)?);
         // Collapsing pages of a file changes its state in memory for other agents. Merged pages show by the time of a write whether
         // another agent has an equal one.
         let advice = [libc::MADV_COLLAPSE, libc::MADV_MERGEABLE];
-        unknown_requests.insert(libc::SYS_madvise, one_of(2, &advice)?);
-        unknown_requests.insert(libc::SYS_prctl, one_of(0, &[PR_SET_MEMORY_MERGE])?);
+        invalid_argument_rules.insert(libc::SYS_madvise, one_of(2, &advice)?);
+        invalid_argument_rules.insert(libc::SYS_prctl, one_of(0, &[PR_SET_MEMORY_MERGE])?);
         let descriptor_of_process = SeccompCmpOp::MaskedEq(CLONE_PIDFD);
         let with_descriptor = rule([SeccompCondition::new(
             0,
@@ -263,9 +263,9 @@ impl Filters {
             descriptor_of_process,
             CLONE_PIDFD,
         )])?;
-        unknown_requests.insert(libc::SYS_clone, vec![with_descriptor]);
+        invalid_argument_rules.insert(libc::SYS_clone, vec![with_descriptor]);
         // An address without a path asks for a name, which older kernels count for the whole host.
-        unknown_requests.insert(
+        invalid_argument_rules.insert(
             libc::SYS_bind,
             one_of(2, &[size_of::<libc::sa_family_t>() as libc::c_int])?,
         );
@@ -274,32 +274,36 @@ impl Filters {
             (libc::SYS_getsockopt, options.clone()),
             (libc::SYS_setsockopt, options),
         ]);
-        let mut controls = one_of(1, &[UNKNOWN_CONTROL.cast_signed()])?;
-        for kind in UNKNOWN_CONTROL_TYPES {
-            let is_of_kind = SeccompCmpOp::MaskedEq(u64::from(CONTROL_TYPE));
-            controls.push(rule([argument(1, is_of_kind, kind.cast_signed())])?);
+        let mut ioctl_rules = one_of(1, &[UNKNOWN_IOCTL.cast_signed()])?;
+        for kind in UNKNOWN_IOCTL_TYPES {
+            let is_of_kind = SeccompCmpOp::MaskedEq(u64::from(IOCTL_TYPE_MASK));
+            ioctl_rules.push(rule([argument(1, is_of_kind, kind.cast_signed())])?);
         }
-        let unknown_controls = Rules::from([(libc::SYS_ioctl, controls)]);
-        // A message that opens a connection would do so unseen.
-        let opens = SeccompCmpOp::MaskedEq(u64::from(MSG_FASTOPEN.cast_unsigned()));
-        let opens_in = |index| {
-            Ok::<_, SandboxError>(vec![rule([argument(index, opens.clone(), MSG_FASTOPEN)])?])
+        let unknown_ioctls = Rules::from([(libc::SYS_ioctl, ioctl_rules)]);
+        // With MSG_FASTOPEN a send call opens a connection without the call `connect`, which the service answers.
+        let has_fast_open = SeccompCmpOp::MaskedEq(u64::from(MSG_FASTOPEN.cast_unsigned()));
+        let fast_open_in_argument = |index| {
+            Ok::<_, SandboxError>(vec![rule([argument(
+                index,
+                has_fast_open.clone(),
+                MSG_FASTOPEN,
+            )])?])
         };
         // `preadv2` with flags can read only what is in memory, or keep what it reads out of memory.
         let with_flags = vec![rule([argument(5, SeccompCmpOp::Ne, 0)])?];
         let unsupported_flags = Rules::from([
             (libc::SYS_preadv2, with_flags),
-            (libc::SYS_sendto, opens_in(3)?),
-            (libc::SYS_sendmsg, opens_in(2)?),
-            (libc::SYS_sendmmsg, opens_in(3)?),
+            (libc::SYS_sendto, fast_open_in_argument(3)?),
+            (libc::SYS_sendmsg, fast_open_in_argument(2)?),
+            (libc::SYS_sendmmsg, fast_open_in_argument(3)?),
         ]);
         Ok(Self(vec![
             filter_unknown_calls(),
             compile(any_arguments(&[ABSENT, ABSENT_ON_THIS_ARCH]), libc::ENOSYS)?,
             compile(ignored, 0)?,
-            compile(unknown_requests, libc::EINVAL)?,
+            compile(invalid_argument_rules, libc::EINVAL)?,
             compile(unknown_options, libc::ENOPROTOOPT)?,
-            compile(unknown_controls, libc::ENOTTY)?,
+            compile(unknown_ioctls, libc::ENOTTY)?,
             compile(unsupported_flags, libc::EOPNOTSUPP)?,
             // Last, because it refuses `seccomp` itself.
             compile(rules, libc::EPERM)?,

@@ -8,10 +8,11 @@ use rustix::rand::{GetRandomFlags, getrandom};
 use std::time::{Duration, Instant};
 
 /// Number of sessions that an agent may start at once; the first is bubblewrap's.
-const SESSIONS: f64 = 9.0;
+const MAX_SESSIONS_AT_ONCE: f64 = 9.0;
 /// Time after which it may start another one.
 const TIME_PER_SESSION: Duration = Duration::from_secs(10);
-/// At least so many sessions may be skipped, and at least so many for each session of the agent.
+/// A random number of sessions is skipped: fewer than the larger of this number and `MAX_SKIPPED_PER_SESSION` for each session of the
+/// agent.
 const MAX_SKIPPED: u32 = 128;
 const MAX_SKIPPED_PER_SESSION: u32 = 16;
 
@@ -19,28 +20,28 @@ const MAX_SKIPPED_PER_SESSION: u32 = 16;
 pub(crate) struct SessionBudget {
     /// Number of sessions started.
     pub started: u32,
-    left: f64,
-    at: Instant,
+    available: f64,
+    updated_at: Instant,
 }
 
 impl SessionBudget {
     pub(crate) fn new(now: Instant) -> Self {
         Self {
             started: 0,
-            left: SESSIONS,
-            at: now,
+            available: MAX_SESSIONS_AT_ONCE,
+            updated_at: now,
         }
     }
 
     /// May the agent start another session now? Then it is counted.
     pub(crate) fn take(&mut self, now: Instant) -> bool {
-        let waited = now.saturating_duration_since(self.at);
-        self.at = now;
+        let waited = now.saturating_duration_since(self.updated_at);
+        self.updated_at = now;
         let gained = waited.as_secs_f64() / TIME_PER_SESSION.as_secs_f64();
-        self.left = (self.left + gained).min(SESSIONS);
-        let may_start = self.left >= 1.0;
+        self.available = (self.available + gained).min(MAX_SESSIONS_AT_ONCE);
+        let may_start = self.available >= 1.0;
         if may_start {
-            self.left -= 1.0;
+            self.available -= 1.0;
             self.started += 1;
         }
         may_start
@@ -92,16 +93,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sessions_are_counted_and_come_back_slowly() {
+    fn session_budget_refills_slowly() {
         let start = Instant::now();
         let mut budget = SessionBudget::new(start);
         let mut started_at = |now| (0..100).filter(|_| budget.take(now)).count();
-        assert_eq!(started_at(start), SESSIONS as usize);
+        assert_eq!(started_at(start), MAX_SESSIONS_AT_ONCE as usize);
         assert_eq!(started_at(start + TIME_PER_SESSION / 2), 0);
         assert_eq!(started_at(start + TIME_PER_SESSION), 1);
         assert_eq!(
             started_at(start + 1000 * TIME_PER_SESSION),
-            SESSIONS as usize
+            MAX_SESSIONS_AT_ONCE as usize
         );
     }
 

@@ -24,8 +24,8 @@ pub fn computation_time_penalty(time: &ComputationTime) -> f64 {
     time_penalty(time, STEP_S, points)
 }
 
-/// Penalty points for the computation times of one episode: the least for an answer that took longer than a control step, twice as many
-/// beyond five control steps, and the most beyond ten, or if the answers took longer than a control step on average.
+/// Penalty points for the computation times of one episode: `least` if an answer took longer than a control step, twice `least` beyond
+/// five control steps, and `most` beyond ten, or if the mean exceeds a control step.
 fn time_penalty(time: &ComputationTime, step_s: f64, [least, most]: [f64; 2]) -> f64 {
     if time.max_s > 10.0 * step_s || time.mean_s > step_s {
         most

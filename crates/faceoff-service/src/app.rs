@@ -10,7 +10,7 @@ use crate::{
     network::Network,
     partial_uploads::PartialUploads,
     passwords::Passwords,
-    places::{Places, Precedence},
+    priority_permits::{Precedence, PriorityPermits},
     problem::Problem,
     rate_limits::{RequestLimiter, RequestSource},
     recent_callers::RecentCallers,
@@ -62,7 +62,7 @@ pub struct AppState {
     pub(crate) game_analyses: SharedCache<String, GameAnalysis>,
     /// Highlights of evaluations by the artifact key of their clips, which never change; `None`: no success.
     pub(crate) highlights: SharedCache<String, Option<Highlight>>,
-    /// Pictures of cards that show a link, as PNG, by the hash of their drawing.
+    /// Link preview images (Open Graph; *cards*), as PNG, by the hash of their drawing.
     pub card_pictures: SharedCache<String, Vec<u8>>,
     /// One permit: only one such picture is drawn at a time, because the slots that run evaluations and games need the CPUs.
     pub card_drawing_permit: Arc<Semaphore>,
@@ -76,9 +76,9 @@ pub struct AppState {
     /// Whether the season has a tournament; false until this process has seen one. Tournaments are never removed.
     pub has_tournaments: AtomicBool,
     /// Readers of live games.
-    pub live_readers: Places,
+    pub live_readers: PriorityPermits,
     /// Readers of the event stream.
-    pub event_readers: Places,
+    pub event_readers: PriorityPermits,
     /// Source of all event streams.
     pub feed: Feed,
     /// Verifies passwords and counts wrong ones.
@@ -145,8 +145,8 @@ impl AppState {
             champion_shares: SharedCache::with_entries(MAX_TOURNAMENTS),
             tournament_computation: Semaphore::new(1),
             has_tournaments: AtomicBool::new(false),
-            live_readers: Places::new(config.limits.live_readers),
-            event_readers: Places::new(config.limits.event_readers),
+            live_readers: PriorityPermits::new(config.limits.live_readers),
+            event_readers: PriorityPermits::new(config.limits.event_readers),
             feed: Feed::new(store.clone()),
             passwords: Passwords::default(),
             request_limiter: RequestLimiter::new(config.rate_limits),
@@ -171,8 +171,8 @@ impl AppState {
             return Ok(answer);
         }
         let _permit = self.tournament_computation.acquire().await;
-        // Read again after the wait, so that all who waited share one computation, but before it: it may then include a later
-        // change, too.
+        // The key is read again after the wait, so that all waiting requests share one computation, and before the computation, which
+        // may then include a later change.
         let key = (self.store.newest_change().await?, tournament);
         answers
             .get(key, async { compute.await.map(Arc::new) })

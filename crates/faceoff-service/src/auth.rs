@@ -6,7 +6,7 @@ use crate::{
     boxed,
     change_quota::{self, RemainingChangesSlot},
     credential::Credential,
-    places::Precedence,
+    priority_permits::Precedence,
     problem::{Problem, ProblemKind},
     recent_callers::RecentCaller,
     request_log, session,

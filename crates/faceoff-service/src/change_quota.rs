@@ -21,20 +21,20 @@ const REMAINING: HeaderName = HeaderName::from_static("ratelimit");
 pub struct ChangeQuota {
     /// `None`: unlimited.
     per_day: Option<NonZeroU32>,
-    counted: Mutex<Counted>,
+    counted: Mutex<ChangeCounts>,
 }
 
 #[derive(Debug, Default)]
-struct Counted {
+struct ChangeCounts {
     day: Date,
-    changes: HashMap<TeamId, u32>,
-    of_tokens: HashMap<TokenId, u32>,
+    by_team: HashMap<TeamId, u32>,
+    by_token: HashMap<TokenId, u32>,
 }
 
 /// Whether a request with this method and path is counted.
 pub(crate) fn is_counted(method: &Method, path: &str) -> bool {
-    let ends = path == "/sign-out" || path.ends_with("/revoke");
-    !method.is_safe() && method != Method::DELETE && !ends
+    let is_revocation = path == "/sign-out" || path.ends_with("/revoke");
+    !method.is_safe() && method != Method::DELETE && !is_revocation
 }
 
 /// What is left of a team's quota after a request.
@@ -45,7 +45,7 @@ pub struct RemainingChanges {
     seconds_to_midnight: i64,
 }
 
-/// Place in a request for what is left of the team's quota, once the caller is authenticated; the response's headers have it.
+/// Request extension, set once the caller is authenticated: what is left of the team's quota, for the headers of the response.
 #[derive(Debug, Clone, Default)]
 pub struct RemainingChangesSlot(Arc<OnceLock<RemainingChanges>>);
 
@@ -76,20 +76,20 @@ impl ChangeQuota {
         let seconds_to_midnight = 24 * 3600 - now.as_second().rem_euclid(24 * 3600);
         let mut counted = self.counted.lock().unwrap_or_else(PoisonError::into_inner);
         if counted.day != time.date() {
-            *counted = Counted {
+            *counted = ChangeCounts {
                 day: time.date(),
-                ..Counted::default()
+                ..ChangeCounts::default()
             };
         }
-        let Counted {
-            changes, of_tokens, ..
+        let ChangeCounts {
+            by_team, by_token, ..
         } = &mut *counted;
-        let (changes, of_token) = (
-            changes.entry(team).or_default(),
-            of_tokens.entry(token).or_default(),
+        let (team_changes, token_changes) = (
+            by_team.entry(team).or_default(),
+            by_token.entry(token).or_default(),
         );
         let per_token = per_day.get().div_ceil(2);
-        let exceeded = match (*changes >= per_day.get(), *of_token >= per_token) {
+        let exceeded = match (*team_changes >= per_day.get(), *token_changes >= per_token) {
             (true, _) => Some(format!(
                 "the team has made {per_day} changes today, as many as a team may make per UTC day"
             )),
@@ -108,11 +108,11 @@ impl ChangeQuota {
                 .with("limit", per_day.get())
                 .retry_after(seconds_to_midnight.unsigned_abs()));
         }
-        *changes += 1;
-        *of_token += 1;
+        *team_changes += 1;
+        *token_changes += 1;
         Ok(Some(RemainingChanges {
             per_day,
-            remaining: per_day.get() - *changes,
+            remaining: per_day.get() - *team_changes,
             seconds_to_midnight,
         }))
     }

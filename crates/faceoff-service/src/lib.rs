@@ -25,7 +25,7 @@ pub mod link_key;
 pub mod network;
 mod partial_uploads;
 pub mod passwords;
-pub mod places;
+pub mod priority_permits;
 pub mod problem;
 pub mod rate_limits;
 mod recent_callers;

@@ -17,9 +17,9 @@ pub struct PartialUploads {
 #[derive(Debug)]
 struct Receiver {
     /// Locked by the connection that may write to the file.
-    file: Arc<tokio::sync::Mutex<()>>,
+    file_lock: Arc<tokio::sync::Mutex<()>>,
     /// Ends the newest connection.
-    end: CancellationToken,
+    cancel_newest: CancellationToken,
     /// Connections that write or wait.
     connections: usize,
 }
@@ -47,19 +47,19 @@ impl PartialUploads {
     /// Ends the connection that receives this partial upload, if there is one, and waits until its bytes are written.
     pub async fn take_over(self: &Arc<Self>, name: &str) -> PartialUploadLock {
         let taken_over = CancellationToken::new();
-        let file = {
+        let file_lock = {
             let mut receivers = self.receivers();
             let receiver = receivers
                 .entry(name.to_owned())
                 .or_insert_with(|| Receiver {
-                    file: Arc::default(),
-                    end: CancellationToken::new(),
+                    file_lock: Arc::default(),
+                    cancel_newest: CancellationToken::new(),
                     connections: 0,
                 });
-            receiver.end.cancel();
-            receiver.end = taken_over.clone();
+            receiver.cancel_newest.cancel();
+            receiver.cancel_newest = taken_over.clone();
             receiver.connections += 1;
-            Arc::clone(&receiver.file)
+            Arc::clone(&receiver.file_lock)
         };
         // Made before the wait, so that a dropped wait is counted, too.
         let mut lock = PartialUploadLock {
@@ -68,7 +68,7 @@ impl PartialUploads {
             taken_over,
             guard: None,
         };
-        lock.guard = Some(file.lock_owned().await);
+        lock.guard = Some(file_lock.lock_owned().await);
         lock
     }
 

@@ -1,7 +1,7 @@
 //! Callers whose tokens were verified recently. Under overload the server tells by them whose request it is without reading the
 //! database.
 
-use crate::places::Precedence;
+use crate::priority_permits::Precedence;
 use std::{
     collections::HashMap,
     mem,
@@ -23,7 +23,7 @@ type SecretHash = [u8; 32];
 #[derive(Debug, Default)]
 pub(crate) struct RecentCallers(Mutex<Generations>);
 
-/// Two generations: when the newer one is full, it becomes the older one, which is forgotten.
+/// Two generations: when the newer one is full, it replaces the older one, whose entries are forgotten.
 #[derive(Debug, Default)]
 struct Generations {
     newer: HashMap<SecretHash, Verified>,

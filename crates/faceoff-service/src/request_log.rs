@@ -16,8 +16,8 @@ pub const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 /// The kind of a request, which decides its log level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum RequestKind {
-    /// Polled by monitoring, or a file that never changes.
-    Probe,
+    /// Polled by monitoring, or a static file.
+    Routine,
     /// Changes nothing (GET, HEAD, OPTIONS).
     Read,
     Change,
@@ -26,16 +26,16 @@ enum RequestKind {
 impl RequestKind {
     /// The kind of a request with this method and path.
     fn new(method: &Method, path: &str) -> Self {
-        /// Beginnings of the paths of probes.
-        const PROBES: [&str; 5] = [
+        /// Beginnings of the paths of routine requests.
+        const ROUTINE_PATHS: [&str; 5] = [
             "/livez",
             "/readyz",
             "/metrics",
             "/static/",
             "/api/v1/health",
         ];
-        if PROBES.iter().any(|probe| path.starts_with(probe)) {
-            Self::Probe
+        if ROUTINE_PATHS.iter().any(|start| path.starts_with(start)) {
+            Self::Routine
         } else if method.is_safe() {
             Self::Read
         } else {
@@ -47,7 +47,7 @@ impl RequestKind {
     fn level(self, status: StatusCode) -> Level {
         match self {
             // A server that is not ready responds with 503 and has logged the reason.
-            Self::Probe => Level::TRACE,
+            Self::Routine => Level::TRACE,
             // The cause of a failure is logged where it occurs.
             _ if status.is_server_error() => Level::WARN,
             Self::Read => Level::DEBUG,

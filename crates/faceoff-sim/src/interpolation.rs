@@ -13,7 +13,7 @@ pub const SUBSTEPS: usize = 20;
 /// Numbers in the longest action, a whole trajectory.
 pub const MAX_ACTION_LEN: usize = SUBSTEPS * 3 * JOINTS;
 
-/// How an agent's actions become a trajectory (PROTOCOL). The protocol's code for it is 1, 2, 3, 4, 5,
+/// How an agent's actions become a trajectory (`docs/protocol.md`, "Actions"). The protocol's code for it is 1, 2, 3, 4, 5,
 /// −1 or null. Polynomials start at the end of the previous commanded trajectory, at reset at the
 /// initial position with zero velocity and acceleration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]

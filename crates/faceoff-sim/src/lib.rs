@@ -57,5 +57,6 @@ pub use perturbation::{
 };
 pub use robot::plant::Plant;
 pub use ruleset::AirHockeyRuleset;
-// `Runaway`: the part of a world that left its bounds, so that the world stopped (*diverged*).
-pub use world::{Bounds, ContactBody, Divergence, Impact, Impacts, MalletState, Runaway, World};
+pub use world::{
+    Bounds, ContactBody, Divergence, DivergenceCause, Impact, Impacts, MalletState, World,
+};

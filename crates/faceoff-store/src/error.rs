@@ -57,10 +57,10 @@ pub enum StoreError {
         /// Shown publicly.
         reason: String,
     },
-    /// The team has withdrawn from the season.
+    /// The team has retired from the season.
     #[error("the team retired at {at}")]
     TeamRetired {
-        /// When the team withdrew.
+        /// When the team retired.
         at: Timestamp,
     },
     /// No member of the team has accepted the current terms.

@@ -62,18 +62,21 @@ pub enum Event {
         invitation: InvitationId,
     },
     /// A user accepted an invitation.
-    PersonJoined {
+    #[serde(rename = "person_joined")]
+    UserJoined {
         name: UserName,
         /// The team of a member; `None` for an organiser.
         team: Option<TeamId>,
     },
     /// The user changed their name, or an organiser did.
-    PersonRenamed {
+    #[serde(rename = "person_renamed")]
+    UserRenamed {
         from: UserName,
         to: UserName,
     },
     /// The user's account was closed.
-    PersonLeft {
+    #[serde(rename = "person_left")]
+    UserLeft {
         name: UserName,
     },
     /// The user signed in in a browser.
@@ -125,7 +128,7 @@ pub enum Event {
     TeamMadeBaseline,
     /// The team is ranked again and is no longer a baseline.
     TeamMadeRanked,
-    /// The team withdrew from the season.
+    /// The team retired from the season.
     TeamRetired,
     /// The team rejoined the season.
     TeamReturned,
@@ -166,7 +169,8 @@ pub enum Event {
     /// one, or the team's choice.
     SubmissionActivated,
     /// The submission was excluded from a day, because the stage does not accept its runtime.
-    SubmissionNotTaken {
+    #[serde(rename = "submission_not_taken")]
+    SubmissionExcluded {
         stage: StageId,
         day: Date,
         /// The runtimes that the stage accepts, and the submission's.
@@ -180,7 +184,8 @@ pub enum Event {
         reason: String,
     },
     /// The submission's bundle was removed, because it is not needed any more.
-    ArchiveRemoved {
+    #[serde(rename = "archive_removed")]
+    BundleRemoved {
         reason: String,
     },
     /// The team set or removed the submission's label.
@@ -299,7 +304,7 @@ pub enum Event {
     },
     /// A job failed by a platform fault; it is retried, or was given up.
     #[serde(rename = "unit_given_back")]
-    JobReturned {
+    JobFailed {
         /// Id of the job, as in the server's log.
         #[serde(rename = "unit")]
         job: Uuid,
@@ -325,7 +330,8 @@ pub enum Event {
         reason: String,
     },
     /// The evaluation is an extra one, beside the team's regular one of the day.
-    ExtraTurnGiven {
+    #[serde(rename = "extra_turn_given")]
+    ExtraEvaluationAdded {
         /// Public.
         reason: String,
     },
@@ -407,7 +413,8 @@ pub enum Event {
         teams: Vec<TeamId>,
     },
     /// A team was removed from the tournament before its first round.
-    TeamOut {
+    #[serde(rename = "team_out")]
+    EntrantRemoved {
         team: TeamId,
         /// Public.
         reason: String,
@@ -431,16 +438,19 @@ pub enum Event {
         round: RoundNumber,
     },
     /// Replays of the schedule were requested; they do not count.
-    ReplaysOrdered {
+    #[serde(rename = "replays_ordered")]
+    ScheduleReplaysRequested {
         times: u32,
         games: u32,
     },
     /// The replays that had not been played were cancelled.
-    ReplaysCancelled {
+    #[serde(rename = "replays_cancelled")]
+    ScheduleReplaysCancelled {
         games: u32,
     },
     /// A test game or a friendly game was queued.
-    FreeGameQueued {
+    #[serde(rename = "free_game_queued")]
+    TestOrFriendlyGameQueued {
         team: TeamId,
         /// The opponent in a friendly game; `None`: a test game against the baseline.
         opponent: Option<TeamId>,
@@ -455,7 +465,8 @@ pub enum Event {
         attempt: u32,
     },
     /// The game was given up after platform faults: it has no result.
-    GameBroken {
+    #[serde(rename = "game_broken")]
+    GamePlatformFailed {
         reason: String,
     },
     /// The game's result no longer counts.
@@ -498,7 +509,8 @@ pub enum Event {
         name: String,
     },
     /// The webhook was disabled, because its deliveries kept failing.
-    WebhookDied {
+    #[serde(rename = "webhook_died")]
+    WebhookDisabled {
         webhook: WebhookId,
         reason: String,
     },
@@ -518,7 +530,8 @@ pub enum Event {
         worker: String,
         reason: String,
         /// Number of shards, run by this worker, that are repeated.
-        again: u32,
+        #[serde(rename = "again")]
+        repeated_shards: u32,
     },
     /// Results of the remote worker are accepted again.
     WorkerReadmitted {

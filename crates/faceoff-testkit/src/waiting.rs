@@ -19,7 +19,7 @@ pub async fn wait_for<T>(store: &Store, check: impl AsyncFn() -> Option<T>) -> T
 pub async fn wait_for_validation(store: &Store, id: SubmissionId) -> Submission {
     wait_for(store, async || {
         let submission = store.submission(id).await.unwrap();
-        submission.state.is_checked().then_some(submission)
+        submission.state.validation_is_over().then_some(submission)
     })
     .await
 }

@@ -74,7 +74,7 @@ async fn apply_retentions(store: &Store, now: Timestamp) {
 
 /// Removes the bundles of invalid submissions.
 pub(crate) async fn remove_invalid_bundles(store: &Store, now: Timestamp) {
-    match store.remove_refused_bundles(now).await {
+    match store.remove_failed_bundles(now).await {
         Ok(0) => {}
         Ok(bundles) => tracing::info!(bundles, "invalid bundles were removed"),
         Err(error) => tracing::warn!(%error, "invalid bundles could not be removed"),

@@ -75,12 +75,12 @@ impl LocalServer {
     /// A validation run like an evaluation of the stage; without one, like an evaluation by the server's settings.
     fn validation_spec(
         &self,
-        stage: Option<(Ruleset, RunPlan)>,
+        ruleset_and_plan: Option<(Ruleset, RunPlan)>,
         seeds: RunSeeds,
     ) -> ValidationSpec {
         let competition = self.competition();
         let RunSeeds { episodes, mismatch } = seeds;
-        match stage {
+        match ruleset_and_plan {
             Some((ruleset, plan)) => ValidationSpec {
                 ruleset,
                 profile: plan.profile,
@@ -113,14 +113,14 @@ impl LocalServer {
             Job::Validation {
                 submission,
                 seeds,
-                stage,
+                ruleset_and_plan,
                 runtimes,
             } => {
-                let limits = stage.as_ref().map(|stage| stage.1.limits.clone());
+                let limits = ruleset_and_plan.as_ref().map(|both| both.1.limits.clone());
                 JobPayload::Validation {
                     submission: submission.id,
                     agent: self.agent(submission.bundle, &limits.unwrap_or_default()),
-                    spec: self.validation_spec(stage.map(|stage| *stage), seeds),
+                    spec: self.validation_spec(ruleset_and_plan.map(|both| *both), seeds),
                     runtimes,
                 }
             }
@@ -382,7 +382,7 @@ impl JobServer for LocalServer {
                 } => {
                     let recording = recording.map(game_recording);
                     let commit = GameCommit {
-                        score,
+                        results: score,
                         recording,
                         logs,
                     };
@@ -404,7 +404,9 @@ impl JobServer for LocalServer {
                 ReleaseReason::Interrupted => self.store.release(&claim, now).await,
                 ReleaseReason::FullDisk => self.store.release_disk_full(&claim, now).await,
                 ReleaseReason::PlatformFault(summary) => {
-                    self.store.release_failed(&claim, summary, now).await
+                    self.store
+                        .release_after_platform_fault(&claim, summary, now)
+                        .await
                 }
             }
         })?)

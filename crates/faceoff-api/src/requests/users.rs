@@ -21,11 +21,11 @@ pub struct NewToken {
     pub team: Option<TeamId>,
 }
 
-/// What happens to the tokens, invitations and webhooks that were made with a revoked token.
+/// What happens to the credentials (tokens, invitations and webhooks) that were created with a revoked token.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = Made)]
-pub enum CreatedWithToken {
+pub enum CreatedCredentials {
     /// They stay.
     Keep,
     /// They end.
@@ -40,7 +40,7 @@ pub struct RevocationQuery {
     /// What happens to all that was made with the token. Default: it ends, unless the token is your own: others may have used it.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[param(inline)]
-    pub made: Option<CreatedWithToken>,
+    pub made: Option<CreatedCredentials>,
 }
 
 /// The role that an invitation gives.

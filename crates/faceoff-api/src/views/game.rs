@@ -1,7 +1,7 @@
 //! Games between two submissions: purpose, state and result. A *meeting* is a pairing of two teams in a round. With mirrored
 //! pairs it has two games, with the same seed and swapped sides.
 
-use faceoff_scoring::tournament::{Forfeit, ResultReason};
+use faceoff_scoring::tournament::{ForfeitKind, ResultReason};
 use faceoff_types::{
     ComputationTimeSummary, GameId, RoundNumber, Seed, StageName, SubmissionId, TeamId, TeamName,
     Tier, TournamentId, ViolationCounts, deprecated_names,
@@ -164,7 +164,7 @@ pub struct GameResultView {
     /// Computation times of all answers, in seconds.
     pub computation_time_s: [ComputationTimeSummary; 2],
     /// Why a side forfeited: the limit that it exceeded; null if it did not forfeit.
-    pub forfeits: [Option<Forfeit>; 2],
+    pub forfeits: [Option<ForfeitKind>; 2],
     /// The winner's name; null: a draw.
     pub winner: Option<TeamName>,
     /// Why the winner won, for API clients.

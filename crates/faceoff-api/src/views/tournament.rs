@@ -13,7 +13,8 @@ use utoipa::ToSchema;
 
 /// A tournament, as in lists.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-pub struct TournamentHead {
+#[schema(as = TournamentHead)]
+pub struct TournamentSummary {
     /// Id of the tournament.
     pub id: TournamentId,
     /// Number in its season, from 1; the seeds derive from it.
@@ -57,7 +58,7 @@ pub enum TournamentPhase {
 pub struct TournamentView {
     /// The fields that also appear in lists of tournaments.
     #[serde(flatten)]
-    pub head: TournamentHead,
+    pub summary: TournamentSummary,
     /// What results depend on; fixed from the first round on.
     pub rules: TournamentRules,
     /// What results do not depend on.

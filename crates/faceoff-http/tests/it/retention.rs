@@ -220,7 +220,7 @@ async fn submission_without_bundle_cannot_be_deleted() {
     delete_it(&submission)
         .await
         .problem(409, "conflict", &["removes its bundle automatically"]);
-    site.store.remove_refused_bundles(site.now()).await.unwrap();
+    site.store.remove_failed_bundles(site.now()).await.unwrap();
     delete_it(&submission)
         .await
         .problem(409, "conflict", &["nothing left to delete"]);

@@ -24,10 +24,13 @@ async fn stage_limits_are_rules_and_apply_to_validation_runs() {
     assert_eq!(changed["revision"], 2);
     assert_eq!(changed["revisions"][0].get("limits"), None);
     site.upload(&team.token, GZIP.to_vec()).await.json(201);
-    let Job::Validation { stage, .. } = site.claim().await.job else {
+    let Job::Validation {
+        ruleset_and_plan, ..
+    } = site.claim().await.job
+    else {
         panic!("expected a validation run");
     };
-    let (_, plan) = *stage.expect("the stage is open");
+    let (_, plan) = *ruleset_and_plan.expect("the stage is open");
     let limits = &plan.limits;
     assert_eq!((limits.memory_bytes, limits.pids), (Some(64 << 20), None));
     assert_eq!(json!(plan.tasks), changed["tasks"]);

@@ -251,18 +251,16 @@ async fn tournament_items(app: &App) -> Result<Vec<Item>, Problem> {
     Ok(items.collect())
 }
 
-/// Evaluations of a day that failed because of a platform fault or were not played, and are not repeated.
+/// Evaluations of a day that failed because of a platform fault or were not played, and that have no rerun.
 async fn failures(app: &App, day: StageDay) -> Result<Vec<Item>, Problem> {
     let visibility = Visibility::for_organiser(app).await?;
     let views = evaluation::day_evaluations(app, &visibility, day).await?;
     let evaluations = app.store.evaluations_of_day(day).await?;
-    let to_repeat: BTreeSet<_> = pending_decisions::evaluations_to_repeat(&evaluations)
+    let to_rerun: BTreeSet<_> = pending_decisions::evaluations_to_rerun(&evaluations)
         .map(|evaluation| evaluation.id)
         .collect();
-    let to_repeat = views
-        .into_iter()
-        .filter(|view| to_repeat.contains(&view.id));
-    let items = to_repeat.filter_map(|view| {
+    let to_rerun = views.into_iter().filter(|view| to_rerun.contains(&view.id));
+    let items = to_rerun.filter_map(|view| {
         let (outcome, reason) = match view.status {
             EvaluationStatus::PlatformFailed { reason, .. } => {
                 ("failed because of a platform fault", reason)

@@ -92,7 +92,7 @@ async fn page_with(
         let selected = all_games.iter().filter(|game| is_selected(&game.state));
         selected.cloned().collect::<Vec<_>>()
     };
-    let phase = view.head.phase;
+    let phase = view.summary.phase;
     let can_start_round = matches!(phase, TournamentPhase::Open | TournamentPhase::Between);
     let has_groups = matches!(view.rules.format, TournamentFormat::Groups { .. });
     let progress = tournament::progress(&state);
@@ -100,7 +100,7 @@ async fn page_with(
     let page = Page {
         frame: Frame::load(app, "").await?,
         head: DashboardHeader::new(&user.caller, PATH, notice),
-        phase: tournament_text::phase_label(&view.head),
+        phase: tournament_text::phase_label(&view.summary),
         format: tournament_text::describe_format(&view.rules),
         last_round: view.rules.format.last_round().to_string(),
         teams: teams.filter(|team| team.departure.is_none()).count(),

@@ -12,7 +12,7 @@ use axum::{
     extract::{Query, State},
     response::Response,
 };
-use faceoff_api::views::tournament::TournamentHead;
+use faceoff_api::views::tournament::TournamentSummary;
 use faceoff_service::{
     app::App,
     extract::PageForm,
@@ -29,7 +29,7 @@ pub(super) const PATH: &str = "/organiser/tournaments";
 
 /// A tournament in the table.
 struct Row {
-    head: TournamentHead,
+    summary: TournamentSummary,
     phase: String,
     teams: usize,
     /// Games of the started rounds: with a result, and all.
@@ -80,16 +80,16 @@ async fn page_with(
     let mut rows = Vec::new();
     for tournament in app.store.tournaments().await?.into_iter().rev() {
         let state = tournament::listed_state(app, tournament.id).await?;
-        let head = tournament::head(&state);
+        let summary = tournament::summary(&state);
         let progress = tournament::progress(&state);
         let teams = state.entrants.iter();
         rows.push(Row {
-            phase: tournament_text::phase_label(&head),
+            phase: tournament_text::phase_label(&summary),
             teams: teams.filter(|team| team.departure.is_none()).count(),
             played: progress.played,
             games: progress.games - progress.cancelled,
             decision: pending_decisions::of_tournament(&state).map(decision_text),
-            head,
+            summary,
         });
     }
     let stages = app.store.stages().await?.into_iter();

@@ -145,7 +145,7 @@ fn blocked_channel_never_blocks_the_evaluator() {
 }
 
 #[test]
-fn out_of_band_bytes_end_no_later_than_the_deadline() {
+fn out_of_band_bytes_do_not_block_a_read() {
     assert_calls_return(
         "out-of-band",
         vec![

@@ -1,4 +1,4 @@
-//! Counters of the whole host: nothing that an agent reads is moved by another agent, a visitor, an upload or another program. Entries of
+//! Counters of the whole host: nothing that an agent reads is changed by another agent, a visitor, an upload or another program. Entries of
 //! the list in `docs/security.md` are tried in `tests/agents/host_counters.py`, which knows the system call numbers of this
 //! architecture only.
 #![cfg(target_arch = "x86_64")]
@@ -46,14 +46,14 @@ fn differences<'a>(one: &'a Readings, other: &Readings) -> Vec<&'a str> {
 
 /// What a team, a visitor or another program can do: it fills the disk and memory, opens connections, sends packets, and starts
 /// processes. It is undone on drop.
-struct Outside {
+struct HostActivity {
     _folder: tempfile::TempDir,
     _memory: Vec<u8>,
     _connections: Vec<(TcpStream, TcpStream)>,
 }
 
-impl Outside {
-    fn act(disk: &Path) -> Self {
+impl HostActivity {
+    fn start(disk: &Path) -> Self {
         let folder = tempfile::tempdir_in(disk).unwrap();
         let mut upload = fs::File::create(folder.path().join("upload")).unwrap();
         upload.write_all(&vec![1; 4 << 20]).unwrap();
@@ -84,7 +84,7 @@ impl Outside {
 /// A team's agent learns something, and sends each of 200 bits by all means at once: another team's agent reads the same values in all
 /// cases.
 #[test]
-fn relayed_bits_change_no_reading() {
+fn agent_readings_do_not_depend_on_host_activity() {
     const BITS: usize = 200;
     let sender = Subject::new("host_counters", &[]);
     let receiver = Subject::new("host_counters", &[]);
@@ -95,17 +95,17 @@ fn relayed_bits_change_no_reading() {
     let random = RandomState::new();
     let mut sent = 0;
     for bit in 0..BITS {
-        let outside = (random.hash_one(bit) % 2 == 1).then(|| {
+        let host_activity = (random.hash_one(bit) % 2 == 1).then(|| {
             sent += 1;
             assert!(ask(&mut sending, "move").as_u64().unwrap() > 20);
-            Outside::act(receiver.bundle.path().parent().unwrap())
+            HostActivity::start(receiver.bundle.path().parent().unwrap())
         });
         let found = read(&mut receiving);
         assert_eq!(
             differences(&expected, &found),
             [] as [&str; 0],
             "bit {bit} is {}: {found:#?}",
-            outside.is_some()
+            host_activity.is_some()
         );
         assert!(ask(&mut sending, "end").is_null());
     }
@@ -194,7 +194,7 @@ fn without_layers_agents_can_signal() {
     let subject = without(Layer::Seccomp);
     let mut agent = subject.spawn();
     let before = read(&mut agent);
-    let _outside = Outside::act(subject.bundle.path().parent().unwrap());
+    let _host_activity = HostActivity::start(subject.bundle.path().parent().unwrap());
     ask(&mut subject.spawn(), "move");
     let after = read(&mut agent);
     let moved = differences(&before, &after);

@@ -21,7 +21,7 @@ fn agent_runs_in_the_developers_environment() {
 }
 
 #[test]
-fn agent_is_capped_and_killed_without_a_sandbox() {
+fn line_limit_and_kill_work_without_a_sandbox() {
     let subject = unsandboxed("floods", &["endless"]);
     let mut agent = subject.spawn();
     let outcome = agent.read_line(LINE_CAP, Instant::now() + TIMEOUT).unwrap();

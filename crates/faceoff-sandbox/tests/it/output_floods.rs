@@ -5,7 +5,7 @@ use faceoff_sandbox::ReadLine;
 use std::time::Instant;
 
 #[test]
-fn endless_line_is_cut() {
+fn endless_line_is_reported_as_too_long() {
     let subject = Subject::new("floods", &["endless"]);
     let mut agent = subject.spawn();
     match agent.read_line(LINE_CAP, Instant::now() + TIMEOUT).unwrap() {

@@ -2,7 +2,7 @@
 
 use super::points::MAX_EPISODE_PENALTY;
 use super::{
-    result::{Forfeit, GameResult, ResultReason},
+    result::{ForfeitKind, GameResult, ResultReason},
     rules::{GameTally, final_score, forfeit_score, judge},
     side::Side,
     submission_label::SubmissionLabel,
@@ -50,7 +50,7 @@ pub struct GameEntry {
     pub windows: Option<u32>,
     /// The limit that each side exceeded, if it forfeited.
     #[serde(default, skip_serializing_if = "has_no_forfeit")]
-    pub forfeit: [Option<Forfeit>; 2],
+    pub forfeit: [Option<ForfeitKind>; 2],
     /// What the game counts after a forfeit; absent: 10 : 0.
     #[serde(default, skip_serializing_if = "ForfeitScore::is_legacy")]
     pub forfeit_score: ForfeitScore,
@@ -62,7 +62,7 @@ pub struct GameEntry {
     pub pair: Option<u32>,
 }
 
-fn has_no_forfeit(forfeit: &[Option<Forfeit>; 2]) -> bool {
+fn has_no_forfeit(forfeit: &[Option<ForfeitKind>; 2]) -> bool {
     *forfeit == [None, None]
 }
 
@@ -161,7 +161,7 @@ impl PlayedGame {
 
     /// The limit that each side exceeded; `None` if it did not forfeit.
     #[must_use]
-    pub const fn forfeits(&self) -> [Option<Forfeit>; 2] {
+    pub const fn forfeits(&self) -> [Option<ForfeitKind>; 2] {
         self.raw.forfeit
     }
 

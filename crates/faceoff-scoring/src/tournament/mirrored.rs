@@ -50,7 +50,7 @@ pub struct VarianceComparison {
 }
 
 /// Goal differences of a pair for the first submission of the pairing: `[home game, away game]`.
-type Halves = [i64; 2];
+type PairDifferences = [i64; 2];
 
 /// Finds the complete mirrored pairs. Goals are those of the standings, so 10 : 0 or more for a forfeit.
 ///
@@ -59,19 +59,19 @@ type Halves = [i64; 2];
 pub fn find_mirrored_pairs<'a>(
     games: impl IntoIterator<Item = &'a PlayedGame>,
 ) -> Result<MirroredPairs, InvalidPair> {
-    let mut pairings = BTreeMap::<[RatedSubmission; 2], Vec<Halves>>::new();
+    let mut pairings = BTreeMap::<[RatedSubmission; 2], Vec<PairDifferences>>::new();
     for unit in sampling_units(games)? {
         if let [first, second] = unit[..] {
             let mut submissions = Side::BOTH.map(|side| RatedSubmission::from_side(first, side));
-            // In the first half the first submission is at home, regardless of the sequence of the games.
+            // In the home game the first submission is at home, regardless of the sequence of the games.
             let [home, away] = if submissions.is_sorted() {
                 [first, second]
             } else {
                 [second, first]
             };
             submissions.sort();
-            let halves = [goal_difference(home), -goal_difference(away)];
-            pairings.entry(submissions).or_default().push(halves);
+            let differences = [goal_difference(home), -goal_difference(away)];
+            pairings.entry(submissions).or_default().push(differences);
         }
     }
     for pairs in pairings.values_mut() {
@@ -101,7 +101,7 @@ fn goal_difference(game: &PlayedGame) -> i64 {
     i64::from(home) - i64::from(away)
 }
 
-fn compare_variances(pairings: &[Vec<Halves>]) -> Option<VarianceComparison> {
+fn compare_variances(pairings: &[Vec<PairDifferences>]) -> Option<VarianceComparison> {
     let [of_pairs, of_independent_games] = pooled_variances(pairings)?;
     let ratio = |[of_pairs, of_independent_games]: [f64; 2]| {
         (of_independent_games > 0.0).then(|| of_pairs / of_independent_games)
@@ -115,11 +115,12 @@ fn compare_variances(pairings: &[Vec<Halves>]) -> Option<VarianceComparison> {
 }
 
 /// `[Var(D₁ + D₂), Var(D₁) + Var(D₂)]`; `None` if no pairing has two pairs.
-fn pooled_variances(pairings: &[Vec<Halves>]) -> Option<[f64; 2]> {
+fn pooled_variances(pairings: &[Vec<PairDifferences>]) -> Option<[f64; 2]> {
     let mut sums = [0.0; 2];
     let mut degrees_of_freedom = 0;
     for pairs in pairings {
-        let squares = |value: fn(&Halves) -> i64| squared_deviations(pairs.iter().map(value));
+        let squares =
+            |value: fn(&PairDifferences) -> i64| squared_deviations(pairs.iter().map(value));
         sums[0] += squares(|[home, away]| home + away);
         sums[1] += squares(|[home, _]| *home) + squares(|[_, away]| *away);
         degrees_of_freedom += pairs.len().saturating_sub(1);

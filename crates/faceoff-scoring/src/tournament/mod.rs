@@ -29,7 +29,7 @@ pub use goal_difference::{GoalDifference, MIN_FOR_INTERVAL};
 pub use head_to_head::{HeadToHead, head_to_head};
 pub use mirrored::{MirroredPairs, SubmissionPairing, VarianceComparison, find_mirrored_pairs};
 pub use points::{EE_POINTS, JOINT_POS_POINTS, JOINT_VEL_POINTS, LINK_POINTS, MAX_EPISODE_PENALTY};
-pub use result::{DrawReason, Forfeit, GameResult, ResultReason, WinReason};
+pub use result::{DrawReason, ForfeitKind, GameResult, ResultReason, WinReason};
 pub use rules::{
     FORFEIT_GOALS, GameTally, POINTS_DRAW, POINTS_LOSS, POINTS_WIN, final_score, forfeit_score,
     judge, winner,

@@ -31,7 +31,7 @@ pub enum WinReason {
     /// The other side forfeited.
     Forfeit {
         /// The limit that the other side exceeded.
-        cause: Forfeit,
+        cause: ForfeitKind,
         /// Whether the winner also had the higher final score before forfeits.
         had_higher_score: bool,
     },
@@ -52,9 +52,9 @@ pub enum DrawReason {
 
 /// The limit that a side exceeded, so that it forfeited the game.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema), schema(as = Forfeit))]
 #[serde(rename_all = "snake_case")]
-pub enum Forfeit {
+pub enum ForfeitKind {
     /// Too many faults.
     Faults,
     /// Too much time for the whole game.
@@ -102,14 +102,14 @@ impl fmt::Display for GameResult {
                 ("the other side is non-deployable", had_higher_score)
             }
             WinReason::Forfeit {
-                cause: Forfeit::Faults,
+                cause: ForfeitKind::Faults,
                 had_higher_score,
             } => (
                 "the other side forfeited: too many faults",
                 had_higher_score,
             ),
             WinReason::Forfeit {
-                cause: Forfeit::Time,
+                cause: ForfeitKind::Time,
                 had_higher_score,
             } => ("the other side forfeited: out of time", had_higher_score),
         };

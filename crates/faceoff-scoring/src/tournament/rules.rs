@@ -1,7 +1,7 @@
 //! The rules that decide a game: points, forfeits, final score and winner.
 
 use super::{
-    result::{DrawReason, Forfeit, GameResult, WinReason},
+    result::{DrawReason, ForfeitKind, GameResult, WinReason},
     side::Side,
 };
 use crate::tier::tier_of;
@@ -27,7 +27,7 @@ pub struct GameTally {
     /// Length of the game in windows of 500 steps; the bounds of the tiers are proportional to it.
     pub windows: u32,
     /// The limit that each side exceeded; `None` if it did not forfeit.
-    pub forfeits: [Option<Forfeit>; 2],
+    pub forfeits: [Option<ForfeitKind>; 2],
 }
 
 /// Final score `[home, away]`: the goals and a point for every third foul of the opponent.
@@ -43,7 +43,7 @@ pub fn final_score(goals: [u32; 2], fouls: [u32; 2]) -> [u32; 2] {
 #[must_use]
 pub fn forfeit_score(
     rule: ForfeitScore,
-    forfeits: [Option<Forfeit>; 2],
+    forfeits: [Option<ForfeitKind>; 2],
     played: [u32; 2],
 ) -> Option<[u32; 2]> {
     let won_by = |winner: Side| {
@@ -140,7 +140,7 @@ mod tests {
     fn judged(
         score: [u32; 2],
         penalty_points: [f64; 2],
-        forfeits: [Option<Forfeit>; 2],
+        forfeits: [Option<ForfeitKind>; 2],
     ) -> GameResult {
         judge(&GameTally {
             score,
@@ -188,29 +188,29 @@ mod tests {
         let unsafe_home = [990.0, 0.0];
         for (forfeits, expected, expected_score) in [
             (
-                [None, Some(Forfeit::Faults)],
+                [None, Some(ForfeitKind::Faults)],
                 GameResult::Won {
                     winner: Home,
                     reason: WinReason::Forfeit {
-                        cause: Forfeit::Faults,
+                        cause: ForfeitKind::Faults,
                         had_higher_score: false,
                     },
                 },
                 [10, 0],
             ),
             (
-                [Some(Forfeit::Time), None],
+                [Some(ForfeitKind::Time), None],
                 GameResult::Won {
                     winner: Away,
                     reason: WinReason::Forfeit {
-                        cause: Forfeit::Time,
+                        cause: ForfeitKind::Time,
                         had_higher_score: true,
                     },
                 },
                 [0, 10],
             ),
             (
-                [Some(Forfeit::Time), Some(Forfeit::Faults)],
+                [Some(ForfeitKind::Time), Some(ForfeitKind::Faults)],
                 GameResult::Drawn(DrawReason::BothForfeit),
                 [0, 0],
             ),
@@ -225,9 +225,9 @@ mod tests {
     }
 
     #[test]
-    fn forfeit_saves_no_goals_of_a_side_far_behind() {
-        let by_home = [Some(Forfeit::Faults), None];
-        let by_away = [None, Some(Forfeit::Time)];
+    fn forfeit_keeps_opponents_lead_above_ten_goals() {
+        let by_home = [Some(ForfeitKind::Faults), None];
+        let by_away = [None, Some(ForfeitKind::Time)];
         for (forfeits, played, expected) in [
             (by_home, [0, 25], [0, 25]),
             (by_home, [3, 14], [3, 14]),
@@ -236,7 +236,7 @@ mod tests {
             (by_away, [11, 0], [11, 0]),
             (by_away, [10, 0], [10, 0]),
             (by_away, [0, 25], [10, 0]),
-            ([Some(Forfeit::Time); 2], [25, 0], [0, 0]),
+            ([Some(ForfeitKind::Time); 2], [25, 0], [0, 0]),
         ] {
             let score = |rule| forfeit_score(rule, forfeits, played).unwrap();
             assert_eq!(score(ForfeitScore::TenOrLead), expected, "{played:?}");

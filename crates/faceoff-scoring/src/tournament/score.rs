@@ -4,7 +4,7 @@
 use super::{
     game::GameEntry,
     points::{violation_names, violation_points},
-    result::{Forfeit, GameResult, ResultReason},
+    result::{ForfeitKind, GameResult, ResultReason},
     rules::{GameTally, final_score, forfeit_score, judge},
     side::Side,
 };
@@ -78,7 +78,7 @@ pub struct GameScore {
 impl GameScore {
     /// The limit that each side exceeded; `None` if it did not forfeit.
     #[must_use]
-    pub fn forfeits(&self) -> [Option<Forfeit>; 2] {
+    pub fn forfeits(&self) -> [Option<ForfeitKind>; 2] {
         self.sides.each_ref().map(|side| forfeit_kind(side.forfeit))
     }
 
@@ -117,10 +117,10 @@ impl GameScore {
 }
 
 /// The cause of a forfeit without its numbers.
-fn forfeit_kind(cause: Option<ForfeitCause>) -> Option<Forfeit> {
+fn forfeit_kind(cause: Option<ForfeitCause>) -> Option<ForfeitKind> {
     cause.map(|cause| match cause {
-        ForfeitCause::Faults { .. } => Forfeit::Faults,
-        ForfeitCause::Time { .. } => Forfeit::Time,
+        ForfeitCause::Faults { .. } => ForfeitKind::Faults,
+        ForfeitCause::Time { .. } => ForfeitKind::Time,
     })
 }
 

@@ -13,15 +13,15 @@ use jiff::{SignedDuration, Timestamp};
 
 /// Default validity of an invitation.
 const DEFAULT_VALIDITY: SignedDuration = SignedDuration::from_hours(7 * 24);
-/// Validity of a link with which a user gets access again, by default and at most.
-pub(crate) const RETURN_VALIDITY: SignedDuration = SignedDuration::from_hours(24);
+/// Validity of a password reset link, by default and at most.
+pub(crate) const PASSWORD_RESET_VALIDITY: SignedDuration = SignedDuration::from_hours(24);
 /// Longest affiliation of a team.
 const MAX_AFFILIATION_CHARS: usize = 120;
 
 /// When an invitation that is created now expires by default.
 pub(crate) fn default_expiry(role: InvitedRole, now: Timestamp) -> Timestamp {
     let validity = match role {
-        InvitedRole::PasswordReset => RETURN_VALIDITY,
+        InvitedRole::PasswordReset => PASSWORD_RESET_VALIDITY,
         InvitedRole::Organiser | InvitedRole::Member | InvitedRole::Founder => DEFAULT_VALIDITY,
     };
     now.saturating_add(validity).unwrap_or(Timestamp::MAX)
@@ -67,7 +67,7 @@ pub async fn join(
     // Checked before the password is hashed, which is expensive.
     app.store.code_status(code_hash, now).await?;
     let team = request.team.map(checked_profile).transpose()?;
-    let password = match request.password {
+    let password_hash = match request.password {
         Some(password) => Some(app.passwords.hash(password, client).await?),
         None => None,
     };
@@ -79,7 +79,7 @@ pub async fn join(
     let join_request = JoinRequest {
         code_hash,
         name: request.name,
-        password,
+        password_hash,
         team,
         accepted_terms: request.accepted_terms,
         token_hash: secret.hash(),

@@ -52,8 +52,8 @@ pub(super) struct RateGuardedBody {
     stream: BodyDataStream,
     rate: MinTransferRate,
     guard: TransferRateGuard,
-    /// What becomes of the bytes that have arrived if the body breaks off, for messages.
-    outcome: &'static str,
+    /// What is stored if the body breaks off, and what the client should do, for messages.
+    retry_advice: &'static str,
 }
 
 /// Streams a bundle into a file under `dir`. `announced_bytes` is the size that the client has announced (`Content-Length`).
@@ -169,14 +169,14 @@ impl RateGuardedBody {
             stream: body.into_data_stream(),
             rate,
             guard: TransferRateGuard::new(rate),
-            outcome: "nothing was stored; send it again",
+            retry_advice: "nothing was stored; send it again",
         }
     }
 
     /// The bytes that arrive are kept.
     pub(super) fn of_part(body: Body, rate: MinTransferRate) -> Self {
         Self {
-            outcome: "what has arrived is kept; GET /api/v1/uploads/HASH says how much, send the rest",
+            retry_advice: "what has arrived is kept; GET /api/v1/uploads/HASH says how much, send the rest",
             ..Self::new(body, rate)
         }
     }
@@ -193,19 +193,22 @@ impl RateGuardedBody {
             }
             Ok(Some(Err(error))) => Err(Problem::new(
                 ProblemKind::InvalidRequest,
-                format!("the upload was interrupted ({error}); {}", self.outcome),
+                format!(
+                    "the upload was interrupted ({error}); {}",
+                    self.retry_advice
+                ),
             )),
-            Err(_) => Err(too_slow(self.rate, self.outcome)),
+            Err(_) => Err(too_slow(self.rate, self.retry_advice)),
         }
     }
 }
 
-fn too_slow(rate: MinTransferRate, outcome: &str) -> Problem {
+fn too_slow(rate: MinTransferRate, retry_advice: &str) -> Problem {
     let MinTransferRate { bytes_per_s, grace } = rate;
     Problem::new(
         ProblemKind::RequestTimeout,
         format!(
-            "the upload was more than {} s behind the minimum rate of {bytes_per_s} bytes per second; {outcome}, if possible over a \
+            "the upload was more than {} s behind the minimum rate of {bytes_per_s} bytes per second; {retry_advice}, if possible over a \
              faster connection",
             grace.as_secs_f64()
         ),

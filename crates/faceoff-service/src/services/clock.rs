@@ -1,4 +1,4 @@
-//! The step of the system clock, which an organiser accepts if the clock is right now.
+//! A step (sudden change) of the system clock, which an organiser accepts if the new time is correct.
 
 use super::decisions::Preview;
 use crate::{
@@ -13,7 +13,7 @@ use std::sync::{
     atomic::{AtomicBool, Ordering},
 };
 
-/// Leases get at least this time after the change, because some may have been renewed by the time before it.
+/// After the step each lease lasts at least this long, because some were renewed according to the old time.
 const MIN_LEASE_S: u32 = 60;
 
 /// The step that is not accepted.
@@ -57,10 +57,10 @@ pub async fn accept_step(
     let clock = app.config.clock.clone();
     let (size, now) = (step.size(), step.server_at + step.shift());
     let is_accepted = Arc::new(AtomicBool::new(false));
-    let accepted = Arc::clone(&is_accepted);
+    let shared_flag = Arc::clone(&is_accepted);
     let accept = Box::new(move || {
-        accepted.store(clock.accept(&step), Ordering::SeqCst);
-        accepted.load(Ordering::SeqCst)
+        shared_flag.store(clock.accept(&step), Ordering::SeqCst);
+        shared_flag.load(Ordering::SeqCst)
     });
     let stored = app
         .store

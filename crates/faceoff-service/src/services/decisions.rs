@@ -45,7 +45,7 @@ pub fn reason_sentence(reason: Option<&str>) -> String {
 }
 
 /// A number of things, such as “3 evaluations”.
-pub fn count(number: u32, thing: &str) -> String {
+pub fn count_text(number: u32, thing: &str) -> String {
     match number {
         1 => format!("1 {thing}"),
         _ => format!("{number} {thing}s"),

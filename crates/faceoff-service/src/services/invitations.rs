@@ -1,7 +1,7 @@
 //! Invitations: creating, listing and revoking them. An *invitation* is a link with a secret code, by which a person gets an
 //! account as organiser, as member or founder of a team, or a new password.
 
-use super::accounts::{RETURN_VALIDITY, default_expiry, join_link};
+use super::accounts::{PASSWORD_RESET_VALIDITY, default_expiry, join_link};
 use crate::{
     app::AppState,
     auth::Caller,
@@ -72,7 +72,12 @@ fn invitation_role(
         (_, InvitedRole::PasswordReset) => new
             .person
             .map(InvitationRole::PasswordReset)
-            .ok_or_else(|| Problem::invalid("person", "expected the id of the returning user")),
+            .ok_or_else(|| {
+                Problem::invalid(
+                    "person",
+                    "expected the id of the user whose password is to be reset",
+                )
+            }),
     }
 }
 
@@ -107,7 +112,7 @@ pub async fn create_invitation(
         .expires_at
         .unwrap_or_else(|| default_expiry(new.role, now));
     let max_validity = match new.role {
-        InvitedRole::PasswordReset => RETURN_VALIDITY,
+        InvitedRole::PasswordReset => PASSWORD_RESET_VALIDITY,
         InvitedRole::Organiser | InvitedRole::Member | InvitedRole::Founder => MAX_VALIDITY,
     };
     if now.duration_until(expires_at) > max_validity {

@@ -1,7 +1,7 @@
 //! Decisions of organisers about results, teams and the queue: voiding an evaluation or a day, pausing the queue, and
 //! disqualifying a team. A *voided* evaluation no longer counts on any board.
 
-use super::decisions::{Preview, checked_reason, count, reason_sentence};
+use super::decisions::{Preview, checked_reason, count_text, reason_sentence};
 use crate::{
     app::AppState,
     boxed,
@@ -68,12 +68,12 @@ pub async fn preview_void_day(
         0 => String::new(),
         open_count => format!(
             " {} will be cancelled.",
-            count(open_count, "unfinished evaluation")
+            count_text(open_count, "unfinished evaluation")
         ),
     };
     let effect = format!(
         "{} of {} will disappear from the boards for good.{cancelled} {}",
-        count(ended_count, "evaluation"),
+        count_text(ended_count, "evaluation"),
         stage_day.date,
         reason_sentence(reason)
     );
@@ -131,7 +131,10 @@ pub async fn preview_disqualification(
         .filter(|evaluation| !evaluation.state.is_over());
     let open = match u32::try_from(open.count()).unwrap_or(u32::MAX) {
         0 => "It has no unfinished evaluations".to_owned(),
-        open => format!("{} will be cancelled", count(open, "unfinished evaluation")),
+        open => format!(
+            "{} will be cancelled",
+            count_text(open, "unfinished evaluation")
+        ),
     };
     let effect = format!(
         "{} will disappear from all boards, and can neither upload nor be evaluated until you reinstate it. {open}. {}",

@@ -171,8 +171,8 @@ fn wrong_offset(offset: u64, received: u64) -> Problem {
 /// What an upload holds until it is stored; the lock is that of an upload in parts.
 pub(super) type UploadGuards = (UploadSlot, Option<PartialUploadLock>);
 
-/// Waits until no other request uses this partial upload.
-pub(super) async fn lock(app: &App, team: TeamId, bundle: blake3::Hash) -> PartialUploadLock {
+/// Ends the request that uses this partial upload, if there is one, and locks the file once its bytes are written.
+pub(super) async fn take_over(app: &App, team: TeamId, bundle: blake3::Hash) -> PartialUploadLock {
     let path = file_of(app, team, bundle);
     app.partial_uploads.take_over(&name_of(&path)).await
 }
@@ -238,7 +238,7 @@ fn read(path: PathBuf, expected: blake3::Hash) -> Result<ReceivedBundle, Problem
 /// # Errors
 /// `NotFound`: nothing.
 pub async fn remove(app: &App, team: TeamId, bundle: blake3::Hash) -> Result<(), Problem> {
-    let _lock = lock(app, team, bundle).await;
+    let _lock = take_over(app, team, bundle).await;
     match tokio::fs::remove_file(file_of(app, team, bundle)).await {
         Ok(()) => Ok(()),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Err(nothing_received(bundle)),

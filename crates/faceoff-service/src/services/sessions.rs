@@ -9,7 +9,7 @@ use crate::{
 };
 use faceoff_api::token::{Secret, SecretKind};
 use faceoff_store::{
-    CreatedCredentials, NewToken, Requester, SESSION_LIFETIME, TokenKind, TokenOwner,
+    NewToken, Requester, RevocationExtent, SESSION_LIFETIME, TokenKind, TokenOwner,
 };
 use faceoff_types::UserId;
 use jiff::Timestamp;
@@ -28,7 +28,7 @@ pub fn session_expiry(now: Timestamp) -> Timestamp {
 pub async fn end(app: &AppState, caller: &Caller) -> Result<(), Problem> {
     let (token, now) = (caller.token.id, app.config.clock.now());
     app.store
-        .revoke_token(caller.actor(), token, CreatedCredentials::Keep, now)
+        .revoke_token(caller.actor(), token, RevocationExtent::TokenOnly, now)
         .await?;
     Ok(())
 }

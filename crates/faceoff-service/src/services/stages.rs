@@ -214,9 +214,9 @@ fn new_revision_effect(stage: &Stage) -> String {
     )
 }
 
-fn reordering_effect(stage: &Stage, standings: CountingResult) -> String {
+fn reordering_effect(stage: &Stage, counting_result: CountingResult) -> String {
     format!(
-        "the rows of its boards will be selected by {standings} instead of {}, at once, from all results",
+        "the rows of its boards will be selected by {counting_result} instead of {}, at once, from all results",
         stage.settings.counting_result
     )
 }

@@ -14,7 +14,7 @@ use faceoff_types::TeamId;
 
 /// The team, if the caller may change it: a member their own, an organiser any.
 #[boxed]
-pub async fn find_own(app: &AppState, caller: &Caller, id: TeamId) -> Result<Team, Problem> {
+pub async fn find_editable(app: &AppState, caller: &Caller, id: TeamId) -> Result<Team, Problem> {
     let team = app.store.team(id).await;
     let team = caller.visible("team", team, |team| team.id)?;
     // A leaked team token must not rename the team or retire it.
@@ -35,7 +35,7 @@ pub async fn change_team(
     id: TeamId,
     change: requests::TeamChange,
 ) -> Result<Team, Problem> {
-    let team = find_own(app, caller, id).await?;
+    let team = find_editable(app, caller, id).await?;
     if change.division.is_some() && !caller.is_organiser() {
         return Err(Problem::new(
             ProblemKind::Forbidden,

@@ -10,12 +10,12 @@ use crate::{
     views::{credentials, token},
 };
 use faceoff_api::{
-    requests::{self, CreatedWithToken},
+    requests::{self, CreatedCredentials},
     token::{Secret, SecretKind},
     views::{credentials::RevokedTokenView, token::NewTokenView},
 };
 use faceoff_store::{
-    CreatedCredentials, NewToken, Principal, StoreError, Token, TokenKind, TokenOwner, TokensOf,
+    NewToken, Principal, RevocationExtent, StoreError, Token, TokenFilter, TokenKind, TokenOwner,
 };
 use faceoff_types::{TeamId, TokenId};
 
@@ -24,10 +24,10 @@ const MAX_NAME_CHARS: usize = 80;
 
 /// The tokens that the caller may see and revoke: organisers all, a member their own and the team's. `None`: only the one that the
 /// request was sent with, for a team's API client. A leaked token must not end others, or get the secret of one that lasts longer.
-const fn manageable(caller: &Caller) -> Option<TokensOf> {
+const fn manageable(caller: &Caller) -> Option<TokenFilter> {
     match &caller.principal {
-        Principal::Operator | Principal::Organiser(_) => Some(TokensOf::Everyone),
-        Principal::Member(user, team) => Some(TokensOf::Member(user.id, team.id)),
+        Principal::Operator | Principal::Organiser(_) => Some(TokenFilter::Everyone),
+        Principal::Member(user, team) => Some(TokenFilter::Member(user.id, team.id)),
         Principal::Team(_) => None,
     }
 }
@@ -173,14 +173,14 @@ pub async fn rotate_token(
     })
 }
 
-/// Revokes a token: it is invalid from now on. What was made with it ends, too, or stays, as `made` says; otherwise it ends unless the token
-/// is the caller's own, because it may have been stolen.
+/// Revokes a token: it is invalid from now on. `created_credentials` says what happens to the credentials that were
+/// created with it. By default they end, too, unless the token is the caller's own: another user's may have been stolen.
 #[boxed]
 pub async fn revoke_token(
     app: &AppState,
     caller: &Caller,
     id: TokenId,
-    made: Option<CreatedWithToken>,
+    created_credentials: Option<CreatedCredentials>,
 ) -> Result<RevokedTokenView, Problem> {
     let token = find(app, caller, id).await?;
     let is_own = match (&caller.principal, token.owner) {
@@ -192,17 +192,17 @@ pub async fn revoke_token(
     };
     let now = app.config.clock.now();
     let default = if is_own {
-        CreatedWithToken::Keep
+        CreatedCredentials::Keep
     } else {
-        CreatedWithToken::End
+        CreatedCredentials::End
     };
-    let made = match made.unwrap_or(default) {
-        CreatedWithToken::Keep => CreatedCredentials::Keep,
-        CreatedWithToken::End => CreatedCredentials::EndExcept(Some(caller.token.id)),
+    let extent = match created_credentials.unwrap_or(default) {
+        CreatedCredentials::Keep => RevocationExtent::TokenOnly,
+        CreatedCredentials::End => RevocationExtent::WithCreatedExcept(Some(caller.token.id)),
     };
     let revoked = app
         .store
-        .revoke_token(caller.actor(), id, made, now)
+        .revoke_token(caller.actor(), id, extent, now)
         .await?;
     tracing::info!(token = %id, actor = %caller.actor(), "token revoked");
     Ok(RevokedTokenView {

@@ -91,7 +91,7 @@ pub(super) async fn check_may_upload(
         .submissions_of(team)
         .await?
         .iter()
-        .filter(|submission| !submission.state.is_checked())
+        .filter(|submission| !submission.state.validation_is_over())
         .count();
     if pending >= limits.max_pending {
         return Err(Problem::new(

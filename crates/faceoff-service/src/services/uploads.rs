@@ -55,7 +55,7 @@ pub async fn upload(
             (received, (slot, None))
         }
         BundleSource::Parts(hash) => {
-            let lock = partial_uploads::lock(app, team, hash).await;
+            let lock = partial_uploads::take_over(app, team, hash).await;
             // Read under the lock: an earlier request with this key may just have made the submission.
             if let Some(earlier) = earlier_upload(app, team, incoming.key.as_ref()).await? {
                 return same_bundle(earlier, &hash);
@@ -167,7 +167,7 @@ async fn store(
     match created {
         Ok(submission) => {
             tracing::info!(team = %team.name, submission = %submission.id, bytes = received.bytes, "uploaded");
-            // That of an upload in parts has been kept until now.
+            // The file of an upload in parts was kept until now, so that the client need not send it again after an error.
             if let Err(failure) = received.remove() {
                 tracing::warn!(%failure, "an uploaded file could not be removed");
             }

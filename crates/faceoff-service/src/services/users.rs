@@ -107,7 +107,7 @@ pub async fn accept_terms(app: &AppState, caller: &Caller, version: u32) -> Resu
 /// Sets the caller's own password; the current one is expected, if there is one. Other tokens and sessions of the user are revoked.
 ///
 /// # Errors
-/// `Forbidden`: another user, or the current password is wrong; `Invalid`: the new one is too short.
+/// `Forbidden`: another user, or the current password is wrong; `InvalidContent`: the new one is too short.
 #[boxed]
 pub async fn set_password(
     app: &AppState,

@@ -31,7 +31,7 @@ pub async fn build(app: &AppState, ablation: Ablation) -> Result<AblationView, P
             episodes_total,
         } => AblationStatus::Unfinished {
             progress: Progress {
-                episodes_done: progress.in_whole_shards(app.config.clock.now()),
+                episodes_done: progress.episodes_visible_to_team(app.config.clock.now()),
                 episodes_total,
             },
         },

@@ -151,7 +151,7 @@ pub async fn build(
     }
     disqualified.retain(|team| selection.is_ranked(team.division.as_ref()));
     let variation = revision.rules.variation;
-    let rows_by = match selection.counting_result {
+    let counting_result = match selection.counting_result {
         Some(counting_result) => counting_result,
         None => board_rows::counting_result(app, stage, scope).await?,
     };
@@ -163,7 +163,7 @@ pub async fn build(
             stage,
             revision_number,
             (scope, extra),
-            rows_by,
+            counting_result,
             &selection,
         )
         .await?
@@ -178,7 +178,7 @@ pub async fn build(
         tier_bounds: app.config.competition().tier_bounds(&variation),
         perturbations: (!variation.perturbations.is_empty()).then_some(variation.perturbations),
         standings: stage.settings.counting_result,
-        rows_by,
+        rows_by: counting_result,
         day: scope.last_day,
         blind: stage.settings.blind,
         provisional: stage.sign_off.is_none(),
@@ -215,11 +215,11 @@ async fn ranked_rows(
     stage: &Stage,
     revision: u32,
     results: (&BoardScope, Vec<BoardRecord>),
-    rows_by: CountingResult,
+    counting_result: CountingResult,
     selection: &BoardSelection,
 ) -> Result<(Vec<BoardRow>, Vec<BaselineRow>), Problem> {
     let task = selection.task;
-    let mut rows = board_rows::rows(app, stage, revision, results, rows_by, task).await?;
+    let mut rows = board_rows::rows(app, stage, revision, results, counting_result, task).await?;
     rows.retain(|row| {
         let team = &row.record.team;
         team.is_baseline || selection.is_ranked(team.profile.division.as_ref())
@@ -319,7 +319,7 @@ fn row_view(ranked: RankedEntry<Row>, rank_group: u32, task: Option<Task>) -> Bo
         evaluation: record.evaluation,
         evaluations,
         day: record.day,
-        extra_evaluation: record.extra_for,
+        extra_evaluation: record.extra_reason,
         rerun_after_release: record.rerun_after_release,
         finished_at: record.finished_at,
         ruleset: result.ruleset,

@@ -30,7 +30,7 @@ fn hours_between(start: Timestamp, end: Timestamp) -> f64 {
 }
 
 /// The forecast of a day: whether its load fits into these slots.
-fn day_load(load: &Load, slots: u32) -> DayLoad {
+fn day_forecast(load: &Load, slots: u32) -> DayLoad {
     let slots = f64::from(slots.max(1));
     let worst_case_hours = load.longest_s / slots / 3600.0;
     let expected_hours = load.expected_ms.map(|ms| ms / 1000.0 / slots / 3600.0);
@@ -208,12 +208,12 @@ pub async fn forecast(
         ));
     }
     let slots = capacity.slots + workers.available_slots(now);
-    let to_day_load = |load: &Load| day_load(load, slots);
+    let to_forecast = |load: &Load| day_forecast(load, slots);
     Ok(CapacityView {
         stage: stage.id,
         stage_name: stage.name.clone(),
         slots,
-        days: loads.iter().map(to_day_load).collect(),
+        days: loads.iter().map(to_forecast).collect(),
     })
 }
 
@@ -238,7 +238,7 @@ mod tests {
             longest_s: worst_hours * f64::from(SLOTS) * 3600.0,
             deadline: available_hours.map(|hours| (Timestamp::UNIX_EPOCH, hours)),
         };
-        day_load(&load, SLOTS)
+        day_forecast(&load, SLOTS)
     }
 
     #[test]

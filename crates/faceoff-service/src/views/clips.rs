@@ -46,7 +46,7 @@ impl Clips {
             ));
         };
         check_released(app, &evaluation).await?;
-        if !visibility.is_own(&evaluation) {
+        if !visibility.has_team_access(&evaluation) {
             visibility.check_not_frozen(&evaluation, "shown")?;
         }
         if let Some(removal) = &evaluation.dataset_removed {
@@ -62,7 +62,7 @@ impl Clips {
             )
         })?;
         Ok(Self {
-            can_see_observations: visibility.is_own(&evaluation)
+            can_see_observations: visibility.has_team_access(&evaluation)
                 || visibility.is_public(&evaluation),
             file,
             evaluation,

@@ -51,8 +51,8 @@ pub async fn build(
 ) -> Result<EvaluationView, Problem> {
     let team = app.store.team(evaluation.team).await?;
     let run = evaluation.run;
-    let shows_faults =
-        visibility.is_own(&evaluation) && !visibility.is_hidden(evaluation.stage_day.stage);
+    let shows_faults = visibility.has_team_access(&evaluation)
+        && !visibility.is_hidden(evaluation.stage_day.stage);
     let mut view = evaluation_view(visibility, evaluation, team.name);
     if let EvaluationStatus::AgentFailed { faults, log, .. } = &mut view.status
         && view.released_at.is_some()
@@ -138,13 +138,14 @@ pub async fn all(
         .collect()
 }
 
-/// Was the seed of a repetition's day public when it was requested? An extra evaluation (`extra_for`: its reason) has a seed of its own.
+/// Was the day's seed already public when a rerun was requested? False for an extra evaluation (one with an
+/// `extra_reason`), which has its own seed.
 pub(super) fn used_public_episodes(
     created_at: Timestamp,
     released_at: Option<Timestamp>,
-    extra_for: Option<&str>,
+    extra_reason: Option<&str>,
 ) -> bool {
-    extra_for.is_none() && released_at.is_some_and(|released_at| created_at >= released_at)
+    extra_reason.is_none() && released_at.is_some_and(|released_at| created_at >= released_at)
 }
 
 /// An evaluation without its position in the queue, and without faults and log.
@@ -230,9 +231,9 @@ fn evaluation_view(
             && used_public_episodes(
                 evaluation.created_at,
                 evaluation.released_at,
-                evaluation.extra_for.as_deref(),
+                evaluation.extra_reason.as_deref(),
             ),
-        extra_evaluation: evaluation.extra_for,
+        extra_evaluation: evaluation.extra_reason,
         voided: evaluation.voided.map(decision::view),
         blind: is_hidden,
         public: is_public,

@@ -38,7 +38,7 @@ impl GameClips {
         game: &Game,
     ) -> Result<Self, Problem> {
         let recording = match &game.state {
-            GameState::Played(played_row) => played_row.recording.as_ref(),
+            GameState::Played(stored_result) => stored_result.recording.as_ref(),
             _ => None,
         };
         let conflict = |detail: &str| Problem::new(ProblemKind::Conflict, detail);
@@ -56,8 +56,9 @@ impl GameClips {
         })?;
         Ok(Self {
             file,
-            can_see_observations: Side::BOTH
-                .map(|side| visibility.is_own(game, side) || visibility.can_see_both_sides(game)),
+            can_see_observations: Side::BOTH.map(|side| {
+                visibility.has_team_access(game, side) || visibility.can_see_both_sides(game)
+            }),
         })
     }
 

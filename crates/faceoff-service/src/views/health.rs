@@ -23,6 +23,7 @@ pub async fn check(app: &AppState) -> Result<HealthView, Problem> {
         QueueHealth::Running { out_of_space, .. } => out_of_space,
         _ => 0,
     };
+    // These words are promised to monitoring: "held" is a pause by an organiser, "paused" a lack of disk space.
     let (running, waiting, queue_state) = match health.queue {
         QueueHealth::Running {
             running, waiting, ..

@@ -69,7 +69,7 @@ pub async fn query(
     });
     let final_cutoff = app.store.final_cutoff(stage.id).await?;
     let final_day = final_cutoff.map(|cutoff_at| stage.day(cutoff_at).date);
-    let rows_by = |day: Date| match (requested_result, stage.settings.counting_result) {
+    let counting_result_on = |day: Date| match (requested_result, stage.settings.counting_result) {
         (Some(counting_result), _) => counting_result,
         (None, CountingResult::Final) if final_day.is_none_or(|final_day| day < final_day) => {
             CountingResult::Latest
@@ -78,7 +78,7 @@ pub async fn query(
     };
     let rows = rows(
         records,
-        rows_by,
+        counting_result_on,
         final_day,
         query.task,
         app.config.competition(),
@@ -104,7 +104,7 @@ pub async fn query(
 /// The rows of each day with the ranks of that day's board. `records` are grouped by team.
 fn rows(
     records: Vec<BoardRecord>,
-    rows_by: impl Fn(Date) -> CountingResult,
+    counting_result_on: impl Fn(Date) -> CountingResult,
     final_day: Option<Date>,
     task: Option<Task>,
     competition: &Competition,
@@ -122,7 +122,7 @@ fn rows(
     let mut rows = Vec::new();
     for (day, day_records) in by_day {
         let rule = CountingRule {
-            counting_result: rows_by(day),
+            counting_result: counting_result_on(day),
             final_day,
             task,
         };

@@ -42,7 +42,7 @@ async fn count_now(app: &AppState) -> Result<usize, Problem> {
         }
         if let Some(day) = app.store.newest_day(stage.id).await? {
             let evaluations = app.store.evaluations_of_day(day.stage_day).await?;
-            in_stages += evaluations_to_repeat(&evaluations).count();
+            in_stages += evaluations_to_rerun(&evaluations).count();
         }
     }
     let in_tournaments = of_tournaments(app).await?.len();
@@ -107,7 +107,7 @@ pub fn of_tournament(state: &TournamentState) -> Option<TournamentDecisionKind> 
 }
 
 /// Evaluations of a day that have no result through no fault of the agent, and that nothing has replaced yet.
-pub fn evaluations_to_repeat(evaluations: &[Evaluation]) -> impl Iterator<Item = &Evaluation> {
+pub fn evaluations_to_rerun(evaluations: &[Evaluation]) -> impl Iterator<Item = &Evaluation> {
     let replaced: BTreeSet<EvaluationId> = evaluations
         .iter()
         .filter_map(|evaluation| evaluation.rerun_of)

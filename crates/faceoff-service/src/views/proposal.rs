@@ -116,10 +116,10 @@ async fn board_record(
         return Ok(None);
     }
     let submission = app.store.submission(evaluation.submission).await?;
-    let (released_at, extra_for) = match evaluation.replaces {
+    let (released_at, extra_reason) = match evaluation.replaces {
         Some(id) => {
             let replaced = app.store.evaluation(id).await?;
-            (replaced.released_at, replaced.extra_for)
+            (replaced.released_at, replaced.extra_reason)
         }
         None => (None, None),
     };
@@ -136,16 +136,16 @@ async fn board_record(
         rerun_after_release: used_public_episodes(
             evaluation.created_at,
             released_at,
-            extra_for.as_deref(),
+            extra_reason.as_deref(),
         ),
-        extra_for,
+        extra_reason,
         finished_at: *finished_at,
         result: (**result).clone(),
     }))
 }
 
 /// The boards without and with the proposed results, and the differences.
-async fn outcome(
+async fn board_effect(
     app: &AppState,
     proposal: &Proposal,
     proposed: &[ProposedEvaluation],
@@ -182,7 +182,7 @@ async fn outcome(
                 new_board: build_board(revision, &empty_scope, proposed_records).await?,
             });
         }
-        ProposalKind::Rules(_) => app.store.board_revision(&stage).await?,
+        ProposalKind::DayWithNewestRules(_) => app.store.board_revision(&stage).await?,
         ProposalKind::Evaluation(_) | ProposalKind::Day(_) => revision,
     };
     let old_board = build_board(old_revision, &BoardScope::default(), Vec::new()).await?;
@@ -260,8 +260,8 @@ pub async fn list(app: &AppState, proposals: Vec<Proposal>) -> Result<Vec<Propos
 pub async fn find(app: &AppState, id: ProposalId) -> Result<ProposalView, Problem> {
     let (proposal, proposed) = app.store.proposal(id).await?;
     let summary = summary(app, &proposal, &proposed).await?;
-    let outcome = match summary.state {
-        ProposalStateView::Played => Some(outcome(app, &proposal, &proposed).await?),
+    let board_effect = match summary.state {
+        ProposalStateView::Played => Some(board_effect(app, &proposal, &proposed).await?),
         _ => None,
     };
     let is_dropped = matches!(proposal.outcome, Some(ProposalOutcome::Dropped(_)));
@@ -271,7 +271,7 @@ pub async fn find(app: &AppState, id: ProposalId) -> Result<ProposalView, Proble
     }
     Ok(ProposalView {
         evaluations,
-        outcome,
+        outcome: board_effect,
         ..summary
     })
 }
@@ -299,7 +299,7 @@ async fn summary(
             ProposalKind::Trial => ProposalKindView::Trial,
             ProposalKind::Evaluation(_) => ProposalKindView::Evaluation,
             ProposalKind::Day(_) => ProposalKindView::Day,
-            ProposalKind::Rules(_) => ProposalKindView::Rules,
+            ProposalKind::DayWithNewestRules(_) => ProposalKindView::Rules,
         },
         day: proposal.kind.day(),
         reason: proposal.reason.clone(),

@@ -85,7 +85,7 @@ pub async fn build(app: &AppState, stage: Stage) -> Result<StageView, Problem> {
         opens_at: stage.opens_at,
         closes_at: stage.closes_at,
         zone: stage.zone,
-        names_seeds: stage.names_seeds,
+        names_seeds: stage.seeds_derive_from_id,
         configured: stage.configured,
         sign_off: stage.sign_off.map(sign_off::view),
         settings: stage.settings,

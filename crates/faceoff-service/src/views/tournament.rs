@@ -11,21 +11,21 @@ use faceoff_api::views::{
     printable,
     tournament::{
         ByeView, DepartureView, EntrantView, RoundProgress, RoundSubmission, RoundView,
-        TournamentHead, TournamentPhase, TournamentView,
+        TournamentPhase, TournamentSummary, TournamentView,
     },
 };
 use faceoff_scoring::tournament::schedule::Table;
 use faceoff_store::{Departure, Entrant, Game, GamePurpose, GameState, TournamentRound};
 use faceoff_types::{RoundNumber, StageName, TeamId, TeamName, TournamentId};
 
-/// The heads of all tournaments, in order of creation. A head has no rounds and tables.
+/// Summaries of all tournaments, without rounds and tables, in order of creation.
 #[boxed]
-pub async fn heads(app: &AppState) -> Result<Vec<TournamentHead>, Problem> {
-    let mut heads = Vec::new();
+pub async fn summaries(app: &AppState) -> Result<Vec<TournamentSummary>, Problem> {
+    let mut summaries = Vec::new();
     for tournament in app.store.tournaments().await? {
-        heads.push(head(&listed_state(app, tournament.id).await?));
+        summaries.push(summary(&listed_state(app, tournament.id).await?));
     }
-    Ok(heads)
+    Ok(summaries)
 }
 
 /// The state of a tournament for lists: standings are built only once they decide the champion.
@@ -38,13 +38,13 @@ pub async fn listed_state(app: &AppState, id: TournamentId) -> Result<Tournament
     }
 }
 
-/// The head of a tournament, whose state has standings if they decide the champion.
-pub fn head(state: &TournamentState) -> TournamentHead {
+/// The summary of a tournament, whose state has standings if they decide the champion.
+pub fn summary(state: &TournamentState) -> TournamentSummary {
     let tables = match is_decided(state) {
         true => state.tables(state.played()),
         false => Vec::new(),
     };
-    build_head(state, &tables)
+    build_summary(state, &tables)
 }
 
 /// The numbers of games of all started rounds.
@@ -58,10 +58,10 @@ pub fn progress(state: &TournamentState) -> RoundProgress {
     progress
 }
 
-fn build_head(state: &TournamentState, tables: &[Table]) -> TournamentHead {
+fn build_summary(state: &TournamentState, tables: &[Table]) -> TournamentSummary {
     let tournament = &state.tournament;
     let phase = phase(state);
-    TournamentHead {
+    TournamentSummary {
         id: tournament.id,
         number: tournament.number,
         name: tournament.name.clone(),
@@ -87,7 +87,7 @@ pub fn view(state: &TournamentState) -> Result<TournamentView, Problem> {
     let tournament = &state.tournament;
     let rounds = state.rounds.iter();
     Ok(TournamentView {
-        head: build_head(state, &tables),
+        summary: build_summary(state, &tables),
         rules: tournament.rules.clone(),
         settings: tournament.settings.clone(),
         baseline: tournament.baseline,

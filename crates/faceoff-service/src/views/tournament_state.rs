@@ -14,8 +14,8 @@ use faceoff_store::{
 use faceoff_types::{RoundNumber, Seed, TeamId, TeamName, TournamentId};
 use std::collections::BTreeMap;
 
-/// More than a round can have pairings, so that the pairs of different rounds get different numbers.
-const MAX_PAIRINGS_PER_ROUND: u32 = 100_000;
+/// Pair numbers reserved for each round: more than a round has pairings, so the numbers of two rounds differ.
+const PAIR_NUMBERS_PER_ROUND: u32 = 100_000;
 
 /// The complete state of a tournament, with draws and results in the scoring's types.
 #[derive(Debug)]
@@ -107,14 +107,14 @@ impl TournamentState {
 
     /// The scored result of a game; `None` without a result.
     pub fn result(&self, game: &Game) -> Result<Option<(GameScore, PlayedGame)>, Problem> {
-        let GameState::Played(played_row) = &game.state else {
+        let GameState::Played(stored_result) = &game.state else {
             return Ok(None);
         };
         let damaged = |error: &dyn std::fmt::Display| {
             Problem::internal(format_args!("the score of game {}: {error}", game.id))
         };
-        let score: GameScore =
-            serde_json::from_value(played_row.score.clone()).map_err(|error| damaged(&error))?;
+        let score: GameScore = serde_json::from_value(stored_result.results.clone())
+            .map_err(|error| damaged(&error))?;
         let [home, away] = game.teams;
         // A test or friendly game belongs to no round; it is scored like a game of the first round.
         let schedule_entry = game.purpose.schedule_entry();
@@ -131,7 +131,7 @@ impl TournamentState {
         game_entry.pair = schedule_entry
             .filter(|_| self.tournament.rules.mirrored)
             .map(|schedule_entry| {
-                schedule_entry.round.get() * MAX_PAIRINGS_PER_ROUND + schedule_entry.pairing
+                schedule_entry.round.get() * PAIR_NUMBERS_PER_ROUND + schedule_entry.pairing
             });
         let played = PlayedGame::try_from(game_entry).map_err(|error| damaged(&error))?;
         Ok(Some((score, played)))

@@ -35,7 +35,7 @@ struct StageRestrictions {
     name: String,
     is_blind: bool,
     /// When evaluations become public automatically.
-    publishes: Publication,
+    publication: Publication,
     has_closed: bool,
     /// The freeze of the boards, if they are frozen.
     frozen: Option<DecisionRecord>,
@@ -68,7 +68,7 @@ impl Visibility {
             let restrictions = StageRestrictions {
                 frozen: frozen.remove(&stage.id),
                 is_blind: stage.settings.blind,
-                publishes: stage.settings.publishes,
+                publication: stage.settings.publishes,
                 has_closed: season_has_closed || stage.phase(now) == StagePhase::Closed,
                 name: stage.name.to_string(),
             };
@@ -91,7 +91,7 @@ impl Visibility {
     pub(crate) fn episodes_done(&self, progress: &RunProgress) -> u32 {
         match self.viewer {
             Viewer::Organiser => progress.episodes_done,
-            Viewer::Team(_) | Viewer::Visitor => progress.in_whole_shards(self.now),
+            Viewer::Team(_) | Viewer::Visitor => progress.episodes_visible_to_team(self.now),
         }
     }
 
@@ -171,7 +171,7 @@ impl Visibility {
         let Some(stage) = self.stages.get(&evaluation.stage_day.stage) else {
             return false;
         };
-        let is_published_by_stage = match stage.publishes {
+        let is_published_by_stage = match stage.publication {
             Publication::Never => false,
             Publication::AtClose => stage.has_closed,
             Publication::AtRelease => true,
@@ -185,7 +185,7 @@ impl Visibility {
     }
 
     /// Whether the viewer may see data that only the evaluation's team and organisers see: faults and logs.
-    pub fn is_own(&self, evaluation: &Evaluation) -> bool {
+    pub fn has_team_access(&self, evaluation: &Evaluation) -> bool {
         match self.viewer {
             Viewer::Organiser => true,
             Viewer::Team(team) => team == evaluation.team,
@@ -202,7 +202,7 @@ impl Visibility {
         evaluation: Result<Evaluation, StoreError>,
     ) -> Result<Evaluation, Problem> {
         match evaluation {
-            Ok(evaluation) if self.is_own(&evaluation) || self.is_public(&evaluation) => {
+            Ok(evaluation) if self.has_team_access(&evaluation) || self.is_public(&evaluation) => {
                 Ok(evaluation)
             }
             Ok(_) | Err(StoreError::NotFound(_)) if self.viewer == Viewer::Visitor => {
@@ -244,15 +244,14 @@ impl<'a> GameVisibility<'a> {
     pub fn is_visible(self, game: &Game) -> bool {
         match game.purpose {
             GamePurpose::Round(_) | GamePurpose::ScheduleReplay { .. } => true,
-            GamePurpose::Test { .. } | GamePurpose::Friendly { .. } => {
-                Side::BOTH.iter().any(|side| self.is_own(game, *side))
-            }
+            GamePurpose::Test { .. } | GamePurpose::Friendly { .. } => Side::BOTH
+                .iter()
+                .any(|side| self.has_team_access(game, *side)),
         }
     }
 
-    /// Whether the side of the game is the viewer's own, so that the viewer may see its recording and log at once. All sides count
-    /// as the organisers' own.
-    pub fn is_own(self, game: &Game, side: Side) -> bool {
+    /// Whether the viewer may see this side's recording and log at once: the side's team, and organisers.
+    pub fn has_team_access(self, game: &Game, side: Side) -> bool {
         match self.viewer {
             Viewer::Organiser => true,
             Viewer::Team(team) => team == game.teams[side.index()],

@@ -26,7 +26,7 @@ pub(super) struct Latency {
 #[derive(Debug, Clone, PartialEq)]
 enum PendingCommand {
     /// At the start of an episode: the robot holds its position.
-    NotYet,
+    HoldPosition,
     Action(Vec<f64>),
     /// The agent's answer was late: the robot continues its last trajectory for a while.
     Late,
@@ -43,7 +43,7 @@ impl Latency {
             second_step_probability: settings.second_step_probability,
             interpolation,
             pucks: None,
-            pending: PendingCommand::NotYet,
+            pending: PendingCommand::HoldPosition,
         }
     }
 
@@ -70,7 +70,7 @@ impl Latency {
     /// Applies the previous control step's command and stores this one.
     pub(super) fn command(&mut self, world: &mut World, robot: usize, command: Command<'_>) {
         match &self.pending {
-            PendingCommand::NotYet => world.hold(robot, self.interpolation),
+            PendingCommand::HoldPosition => world.hold(robot, self.interpolation),
             PendingCommand::Action(action) => world.command(robot, self.interpolation, action),
             PendingCommand::Late => world.coast(robot),
         }

@@ -8,7 +8,7 @@ use crate::{
     model::{GRAVITY_M_S2, INITIAL_Q, JOINTS, LINKS, SUBSTEP_S, TOOL},
     robot::universal_joint::TORQUE_LIMIT_N_M,
     table::{
-        contact_law::{JOINT, MALLET, Material, RIM, WIDTH_M},
+        contact_law::{FULL_IMPEDANCE_DEPTH_M, JOINT, MALLET, Material, RIM},
         frames::table_from_robot,
         geometry::{PUCK, TABLE},
     },
@@ -333,7 +333,7 @@ fn solimp(material: &Material) -> String {
     spaced(&[
         material.impedance_0,
         material.impedance_1,
-        WIDTH_M,
+        FULL_IMPEDANCE_DEPTH_M,
         0.5,
         2.0,
     ])

@@ -5,7 +5,7 @@ use faceoff_types::{Profile, UnknownProfile};
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
 
-/// One difference between the evaluator's simulator and the ideal one (RULES, "Perturbation profiles").
+/// One difference between the evaluator's simulator and the ideal one (`docs/rules.md`, "Perturbations").
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Factor {
@@ -80,7 +80,7 @@ impl Factors {
 
 /// A named set of perturbations.
 ///
-/// The rules also define a rehearsal profile. Only its delays are implemented, as [`AirHockeyProfile::Delay`], not its safety layer.
+/// [`AirHockeyProfile::Delay`] is for a rehearsal: practice with the delays and the table of a real laboratory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AirHockeyProfile {

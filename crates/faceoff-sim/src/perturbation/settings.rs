@@ -1,4 +1,4 @@
-//! Magnitudes of the perturbation factors, such as noise (RULES, "Perturbation profiles"). The *plant* is the robot in the
+//! Magnitudes of the perturbation factors, such as noise (`docs/rules.md`, "Perturbations"). The *plant* is the robot in the
 //! evaluator's simulator, and the *nominal model* is the one that teams have.
 
 use serde::{Deserialize, Serialize};

@@ -22,11 +22,11 @@ const FILTER_OLD: f64 = 0.727;
 
 /// State of the controller: the filtered hinge velocities, rad/s.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct UniversalJoint<T = f64> {
+pub struct UniversalJointController<T = f64> {
     velocity_filtered: [T; 2],
 }
 
-impl<T: Lanes> UniversalJoint<T> {
+impl<T: Lanes> UniversalJointController<T> {
     pub fn at_rest() -> Self {
         Self {
             velocity_filtered: [T::splat(0.0); 2],
@@ -35,15 +35,15 @@ impl<T: Lanes> UniversalJoint<T> {
 
     /// Collects the controllers of several arms.
     #[inline(always)]
-    pub fn gather<'a>(joint: impl Fn(usize) -> &'a UniversalJoint) -> Self {
+    pub fn gather<'a>(controller: impl Fn(usize) -> &'a UniversalJointController) -> Self {
         Self {
-            velocity_filtered: gather(|lane| &joint(lane).velocity_filtered),
+            velocity_filtered: gather(|lane| &controller(lane).velocity_filtered),
         }
     }
 
     /// The controller of one arm.
-    pub fn lane(&self, lane: usize) -> UniversalJoint {
-        UniversalJoint {
+    pub fn lane(&self, lane: usize) -> UniversalJointController {
+        UniversalJointController {
             velocity_filtered: row(&self.velocity_filtered, lane),
         }
     }

@@ -24,7 +24,7 @@ use std::sync::LazyLock;
 
 /// A contact: an overlap of two bodies.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Touch {
+pub struct ContactPoint {
     /// Unit normal, into the second body.
     pub normal: [f64; 3],
     /// Depth of the overlap, m, positive.
@@ -101,14 +101,14 @@ fn overlap(
 }
 
 /// Contact of the puck with a rim. The force acts at the middle of the overlap.
-fn rim_and_puck(rim: &Collider, puck: [f64; 2]) -> Option<Touch> {
+fn rim_and_puck(rim: &Collider, puck: [f64; 2]) -> Option<ContactPoint> {
     let (n, depth_m) = overlap(
         (rim.shape(), *rim.position()),
         rim.contact_skin(),
         (COLLIDERS.puck.shape(), pose_at(puck)),
     )?;
     let lever_m = PUCK.radius_m - 0.5 * depth_m;
-    Some(Touch {
+    Some(ContactPoint {
         normal: [n[0], n[1], 0.0],
         depth_m,
         point: [puck[0] - lever_m * n[0], puck[1] - lever_m * n[1], 0.0],
@@ -122,7 +122,7 @@ fn discs(
     (first, first_radius): ([f64; 2], f64),
     (second, second_radius): ([f64; 2], f64),
     height: f64,
-) -> Option<Touch> {
+) -> Option<ContactPoint> {
     let reach = first_radius + second_radius;
     are_within(first, second, reach).then_some(())?;
     let balls = [first_radius, second_radius].map(Ball::new);
@@ -132,7 +132,7 @@ fn discs(
         (&balls[1], pose_at(second)),
     )?;
     let lever_m = second_radius * (1.0 - depth_m / reach);
-    Some(Touch {
+    Some(ContactPoint {
         normal: [n[0], n[1], 0.0],
         depth_m,
         point: [
@@ -169,7 +169,7 @@ pub fn near_rims(puck: [f64; 2]) -> bool {
 }
 
 /// Calls `add` for each contact of the puck with a rim; there are at most two at a time, in a corner.
-pub fn rims(puck: [f64; 2], mut add: impl FnMut(Touch)) {
+pub fn for_each_rim_contact(puck: [f64; 2], mut add: impl FnMut(ContactPoint)) {
     let [near_long, near_short] = near_long_and_short_rims(puck);
     if !near_long && !near_short {
         return;
@@ -198,7 +198,7 @@ pub fn mallets_near([x_1, y_1, _]: [f64; 3], [x_2, y_2, _]: [f64; 3]) -> bool {
 
 /// Contact of a mallet with the puck, normal into the puck. A leaning cylinder touches the puck first at
 /// the puck's upper or lower edge, and pushes perpendicular to its axis.
-pub fn mallet_and_puck(mallet: &MalletCylinder, puck: [f64; 2]) -> Option<Touch> {
+pub fn mallet_and_puck(mallet: &MalletCylinder, puck: [f64; 2]) -> Option<ContactPoint> {
     if !mallet_near_puck(mallet.centre, puck) {
         return None;
     }
@@ -206,16 +206,16 @@ pub fn mallet_and_puck(mallet: &MalletCylinder, puck: [f64; 2]) -> Option<Touch>
     deepest_of([low.max(0.0), high.min(PUCK.height_m)], |z| {
         let axis = mallet.axis_at(z);
         let reach = mallet.reach([puck[0] - axis[0], puck[1] - axis[1]]);
-        let touch = discs((axis, reach), (puck, PUCK.radius_m), z)?;
-        Some(Touch {
-            normal: mallet.side_normal(touch.normal),
-            ..touch
+        let contact = discs((axis, reach), (puck, PUCK.radius_m), z)?;
+        Some(ContactPoint {
+            normal: mallet.side_normal(contact.normal),
+            ..contact
         })
     })
 }
 
 /// Contact of the two mallets, normal into the second.
-pub fn mallets(first: &MalletCylinder, second: &MalletCylinder) -> Option<Touch> {
+pub fn mallets(first: &MalletCylinder, second: &MalletCylinder) -> Option<ContactPoint> {
     if !mallets_near(first.centre, second.centre) {
         return None;
     }
@@ -228,7 +228,10 @@ pub fn mallets(first: &MalletCylinder, second: &MalletCylinder) -> Option<Touch>
 }
 
 /// The deeper contact at the two ends of a range of heights; `None` if the range is empty.
-fn deepest_of([low, high]: [f64; 2], contact: impl Fn(f64) -> Option<Touch>) -> Option<Touch> {
+fn deepest_of(
+    [low, high]: [f64; 2],
+    contact: impl Fn(f64) -> Option<ContactPoint>,
+) -> Option<ContactPoint> {
     if low >= high {
         return None;
     }

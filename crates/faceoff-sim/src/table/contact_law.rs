@@ -21,8 +21,8 @@ pub struct Material {
     pub friction: f64,
 }
 
-/// Depth from which the impedance is constant, m.
-pub(crate) const WIDTH_M: f64 = 0.001;
+/// Depth from which the impedance is constant, m; MuJoCo calls it the width.
+pub(crate) const FULL_IMPEDANCE_DEPTH_M: f64 = 0.001;
 
 /// Inverse inertia of the puck in the regularisation, 1/kg: one over its mass, averaged over three axes, along one
 /// of which the puck cannot move (MuJoCo's estimate).
@@ -72,7 +72,7 @@ impl Material {
     #[must_use]
     pub fn impedance(&self, depth_m: f64) -> f64 {
         // Share of the rise: two parabolas, which meet in the middle.
-        let x = depth_m / WIDTH_M;
+        let x = depth_m / FULL_IMPEDANCE_DEPTH_M;
         let share = if x >= 1.0 {
             1.0
         } else if x <= 0.5 {
@@ -83,9 +83,9 @@ impl Material {
         self.impedance_0 + (self.impedance_1 - self.impedance_0) * share
     }
 
-    /// Regularisation per inverse inertia, at an impedance.
+    /// The regularisation for an inverse inertia of 1, at an impedance.
     #[must_use]
-    pub fn softness(impedance: f64) -> f64 {
+    pub fn regularisation_per_inverse_inertia(impedance: f64) -> f64 {
         (1.0 - impedance) / impedance
     }
 }

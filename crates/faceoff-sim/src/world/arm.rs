@@ -10,7 +10,7 @@ use crate::{
         inverse_kinematics::with_zero_universal,
         plant::Plant,
         trajectory::{Setpoint, Trajectory, interpolate},
-        universal_joint::{UniversalJoint, mallet_vertical_angles},
+        universal_joint::{UniversalJointController, mallet_vertical_angles},
     },
 };
 
@@ -28,7 +28,7 @@ pub struct Arm {
     /// Desired motion in the current control step.
     pub(super) trajectory: Trajectory,
     pub(super) limiter: SetpointLimiter,
-    pub(super) universal: UniversalJoint,
+    pub(super) universal_controller: UniversalJointController,
     /// Dry friction and stops.
     pub(super) constraints: JointConstraints,
     /// Position of the end effector before the last substep, m, in the robot's base frame.
@@ -54,7 +54,7 @@ impl Arm {
             torque: [0.0; JOINTS],
             trajectory: [Setpoint::at_rest(*joints); SUBSTEPS],
             limiter: SetpointLimiter::new(*joints),
-            universal: UniversalJoint::at_rest(),
+            universal_controller: UniversalJointController::at_rest(),
             constraints: JointConstraints::new(plant),
             ee_before: ee.origin.to_array(),
             coasted_steps: 0,

@@ -10,7 +10,7 @@ use crate::{
     robot::{
         controller::SetpointLimiter,
         plant::{Plant, PlantLanes},
-        universal_joint::UniversalJoint,
+        universal_joint::UniversalJointController,
     },
 };
 
@@ -21,7 +21,7 @@ pub struct ArmLanes<T: Lanes> {
     /// Torques of the drives, N m.
     pub torque: [T; JOINTS],
     pub limiter: SetpointLimiter<T>,
-    pub universal: UniversalJoint<T>,
+    pub universal_controller: UniversalJointController<T>,
     pub friction: FrictionLanes<T>,
     /// Positions of the end effectors before the substep, m, each in its robot's base frame.
     pub ee_before: Vec3<T>,
@@ -52,7 +52,9 @@ impl<T: Lanes> ArmLanes<T> {
             },
             torque: gather(|lane| &arm(lane).torque),
             limiter: SetpointLimiter::gather(|lane| &arm(lane).limiter),
-            universal: UniversalJoint::gather(|lane| &arm(lane).universal),
+            universal_controller: UniversalJointController::gather(|lane| {
+                &arm(lane).universal_controller
+            }),
             friction: FrictionLanes::gather(|lane| &arm(lane).constraints),
             ee_before: {
                 let [x, y, z] = gather(|lane| &arm(lane).ee_before);
@@ -67,7 +69,7 @@ impl<T: Lanes> ArmLanes<T> {
         self.motion.store(lane, arm);
         arm.torque = row(&self.torque, lane);
         arm.limiter = self.limiter.lane(lane);
-        arm.universal = self.universal.lane(lane);
+        arm.universal_controller = self.universal_controller.lane(lane);
         self.friction.store(lane, &mut arm.constraints);
         arm.ee_before = self.ee_before.lane(lane);
     }

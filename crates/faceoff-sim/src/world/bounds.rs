@@ -118,16 +118,16 @@ pub(super) fn is_runaway(arm: &Arm) -> bool {
 /// A world that would have left its bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Divergence {
-    /// Is robot 0, and robot 1, at fault, since its command or state was the first out of bounds? Both are only if it happened in the
-    /// same millisecond.
+    /// Which robots are at fault (robot 0, robot 1): those whose joints or commands first ran away; without any, the robot whose joint
+    /// left its bounds or, for the puck, the robots of the latest contact.
     pub robots_at_fault: [bool; 2],
     /// What would have left the bounds: a joint or the puck.
-    pub cause: Runaway,
+    pub cause: DivergenceCause,
 }
 
-/// The part of a world that leaves its bounds.
+/// The part of a world that would have left the bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Runaway {
+pub enum DivergenceCause {
     /// A joint of a robot. Joints 0 to 6 are driven, 7 and 8 are the hinges of the mallet.
     Joint {
         /// 0 or 1.
@@ -138,7 +138,7 @@ pub enum Runaway {
     Puck,
 }
 
-impl fmt::Display for Runaway {
+impl fmt::Display for DivergenceCause {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Bounds {
             joint_rad_s,

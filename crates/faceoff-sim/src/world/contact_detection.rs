@@ -6,7 +6,7 @@ use crate::{
     dynamics::spatial::{Motion, Vec3},
     model::DOFS,
     table::{
-        contact_finder::{self, Touch},
+        contact_finder::{self, ContactPoint},
         contact_law::{MALLET, MALLETS, RIM},
         frames::{robot_from_table, side, table_from_robot},
         mallet_cylinder::MalletCylinder,
@@ -52,7 +52,7 @@ pub fn find_contacts(
         let centre = table_from_robot(robot, mallets[robot].centre);
         MalletCylinder::along(centre, [side * x, side * y, z])
     };
-    let touches: [Option<Touch>; 2] = std::array::from_fn(|robot| {
+    let puck_contacts: [Option<ContactPoint>; 2] = std::array::from_fn(|robot| {
         (robot < mallets.len())
             .then(|| contact_finder::mallet_and_puck(&cylinder(robot), puck_xy))
             .flatten()
@@ -60,7 +60,7 @@ pub fn find_contacts(
     let between_mallets = (mallets.len() == 2)
         .then(|| contact_finder::mallets(&cylinder(0), &cylinder(1)))
         .flatten();
-    let mallets_touch = between_mallets.is_some() || touches != [None, None];
+    let mallets_touch = between_mallets.is_some() || puck_contacts != [None, None];
     if !mallets_touch && !contact_finder::near_rims(puck_xy) {
         return None;
     }
@@ -69,9 +69,9 @@ pub fn find_contacts(
     if !mallets_touch {
         return (!contacts.is_empty()).then_some(contacts);
     }
-    let mallet_motion = |robot: usize, touch: &Touch| {
+    let mallet_motion = |robot: usize, contact: &ContactPoint| {
         let side = side(robot);
-        let [x, y, z] = robot_from_table(robot, touch.point);
+        let [x, y, z] = robot_from_table(robot, contact.point);
         let (axes, dq) = motion(robot);
         let jacobian = axes.map(|axis| axis.velocity_at(Vec3::new(x, y, z)));
         // In the table frame.
@@ -86,29 +86,29 @@ pub fn find_contacts(
             velocity,
         }
     };
-    for (robot, touch) in touches.into_iter().enumerate() {
-        if let Some(touch) = touch {
+    for (robot, contact) in puck_contacts.into_iter().enumerate() {
+        if let Some(contact) = contact {
             let pair = Pair::Mallet {
                 robot,
-                mallet: &mallet_motion(robot, &touch),
+                mallet: &mallet_motion(robot, &contact),
                 puck_velocity: &puck.velocity,
             };
-            contacts.add(touch, &MALLET, pair);
+            contacts.add(contact, &MALLET, pair);
         }
     }
-    if let Some(touch) = between_mallets {
-        let mallets = [&mallet_motion(0, &touch), &mallet_motion(1, &touch)];
-        contacts.add(touch, &MALLETS, Pair::Mallets { mallets });
+    if let Some(contact) = between_mallets {
+        let mallets = [&mallet_motion(0, &contact), &mallet_motion(1, &contact)];
+        contacts.add(contact, &MALLETS, Pair::Mallets { mallets });
     }
     Some(contacts)
 }
 
 /// Adds the contacts of the puck with the rims.
 pub fn add_rims(contacts: &mut Contacts, puck: &Puck) {
-    contact_finder::rims([puck.pose[0], puck.pose[1]], |touch| {
+    contact_finder::for_each_rim_contact([puck.pose[0], puck.pose[1]], |contact| {
         let pair = Pair::Rim {
             puck_velocity: &puck.velocity,
         };
-        contacts.add(touch, &RIM, pair);
+        contacts.add(contact, &RIM, pair);
     });
 }

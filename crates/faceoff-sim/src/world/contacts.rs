@@ -11,7 +11,7 @@ use super::{
 use crate::{
     model::DOFS,
     table::{
-        contact_finder::Touch,
+        contact_finder::ContactPoint,
         contact_law::{MALLET_INVERSE_INERTIA, Material},
         puck::INVERSE_INERTIA,
     },
@@ -82,7 +82,7 @@ pub enum Pair<'a> {
         mallet: &'a MalletMotion,
         puck_velocity: &'a [f64; 3],
     },
-    /// Robot 1's mallet and robot 2's.
+    /// The mallets of robots 0 and 1.
     Mallets {
         /// Both mallets.
         mallets: [&'a MalletMotion; 2],
@@ -127,13 +127,14 @@ impl Contacts {
             .puck
     }
 
-    /// Adds a contact. The normal of `touch` points into the second body of `pair`.
-    pub fn add(&mut self, touch: Touch, material: &Material, pair: Pair<'_>) {
-        let n = touch.normal;
-        let impedance = material.impedance(touch.depth_m);
-        let regularisation = Material::softness(impedance) * material.inverse_inertia;
+    /// Adds a contact. The normal of `contact` points into the second body of `pair`.
+    pub fn add(&mut self, contact: ContactPoint, material: &Material, pair: Pair<'_>) {
+        let n = contact.normal;
+        let impedance = material.impedance(contact.depth_m);
+        let regularisation =
+            Material::regularisation_per_inverse_inertia(impedance) * material.inverse_inertia;
         // Part of the target that comes from the depth, m/s².
-        let push = material.stiffness_per_s2 * impedance * touch.depth_m;
+        let push = material.stiffness_per_s2 * impedance * contact.depth_m;
         // Two choices match the recordings of the simulator of the 2023 Robot Air Hockey Challenge. The force acts inside the overlap,
         // which is millimetres deep. And there is an upright tangent: the puck does not move along z, but its friction
         // brakes a mallet that does, and shares the friction cone with the horizontal tangent.
@@ -145,7 +146,7 @@ impl Contacts {
             n[0] * horizontal[1] - n[1] * horizontal[0],
         ];
         // Tangential velocity per yaw rate of the second body, m/rad.
-        let spin_lever = -touch.lever_m;
+        let spin_lever = -contact.lever_m;
         for (k, (direction, spin_lever, push)) in [
             (n, 0.0, push),
             (horizontal, spin_lever, 0.0),

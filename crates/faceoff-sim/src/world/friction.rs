@@ -69,7 +69,7 @@ impl<T: Lanes> FrictionLanes<T> {
 
     /// Reads the bound set of one lane from its arm's constraints.
     #[cold]
-    pub fn load(&mut self, lane: usize, constraints: &JointConstraints) {
+    pub fn load_bound_set(&mut self, lane: usize, constraints: &JointConstraints) {
         let replace = |mask: &mut T::Mask, yes: bool| {
             let others = T::bits(*mask) & !(1 << lane);
             *mask = T::mask(others | u32::from(yes) << lane);
@@ -116,9 +116,9 @@ impl<T: Lanes> FrictionLanes<T> {
         let (mut at_upper, mut at_lower) = (self.at_upper, self.at_lower);
         let mut changed = T::mask_xor(at_upper[0], at_upper[0]);
         for i in 0..JOINTS {
-            let force = self.stiffness[i] * (self.target[i] - acceleration[i]);
-            at_upper[i] = self.bound[i].less_than(force);
-            at_lower[i] = force.less_than(-self.bound[i]);
+            let torque = self.stiffness[i] * (self.target[i] - acceleration[i]);
+            at_upper[i] = self.bound[i].less_than(torque);
+            at_lower[i] = torque.less_than(-self.bound[i]);
             changed = T::mask_or(changed, T::mask_xor(at_upper[i], self.at_upper[i]));
             changed = T::mask_or(changed, T::mask_xor(at_lower[i], self.at_lower[i]));
         }
@@ -140,8 +140,8 @@ impl<T: Lanes> FrictionLanes<T> {
     #[inline(always)]
     pub fn torques(&self, acceleration: &[T; DOFS]) -> [T; JOINTS] {
         std::array::from_fn(|i| {
-            let force = self.stiffness[i] * (self.target[i] - acceleration[i]);
-            force.at_least(-self.bound[i]).at_most(self.bound[i])
+            let torque = self.stiffness[i] * (self.target[i] - acceleration[i]);
+            torque.at_least(-self.bound[i]).at_most(self.bound[i])
         })
     }
 }

@@ -58,11 +58,12 @@ pub struct JointConstraints {
 impl JointConstraints {
     /// The constraints of an arm at rest.
     pub fn new(plant: &Plant) -> Self {
-        let softness = Material::softness(JOINT.impedance_0);
+        let regularisation_per_inverse_inertia =
+            Material::regularisation_per_inverse_inertia(JOINT.impedance_0);
         Self {
             friction: [FrictionState::Inside; JOINTS],
             friction_stiffness: std::array::from_fn(|i| {
-                1.0 / (plant.inverse_inertia[i] * softness)
+                1.0 / (plant.inverse_inertia[i] * regularisation_per_inverse_inertia)
             }),
             friction_bound: plant.friction,
             friction_target: [0.0; JOINTS],
@@ -94,7 +95,9 @@ impl JointConstraints {
                 ActiveStop {
                     joint: i,
                     sign,
-                    stiffness: 1.0 / (plant.inverse_inertia[i] * Material::softness(impedance)),
+                    stiffness: 1.0
+                        / (plant.inverse_inertia[i]
+                            * Material::regularisation_per_inverse_inertia(impedance)),
                     target: JOINT.stiffness_per_s2 * impedance * depth
                         - JOINT.damping_per_s * sign * dq[i],
                     is_pushing: true,
@@ -130,10 +133,10 @@ impl JointConstraints {
     pub fn classify(&mut self, acceleration: &[f64; DOFS]) -> bool {
         let mut changed = false;
         for i in 0..JOINTS {
-            let force = self.friction_stiffness[i] * (self.friction_target[i] - acceleration[i]);
-            let state = if force > self.friction_bound[i] {
+            let torque = self.friction_stiffness[i] * (self.friction_target[i] - acceleration[i]);
+            let state = if torque > self.friction_bound[i] {
                 FrictionState::AtUpper
-            } else if force < -self.friction_bound[i] {
+            } else if torque < -self.friction_bound[i] {
                 FrictionState::AtLower
             } else {
                 FrictionState::Inside
@@ -155,8 +158,8 @@ impl JointConstraints {
     fn active_stiffness(&self, acceleration: &[f64; DOFS]) -> [f64; DOFS] {
         let mut stiffness = [0.0; DOFS];
         for i in 0..JOINTS {
-            let force = self.friction_stiffness[i] * (self.friction_target[i] - acceleration[i]);
-            if force.abs() <= self.friction_bound[i] {
+            let torque = self.friction_stiffness[i] * (self.friction_target[i] - acceleration[i]);
+            if torque.abs() <= self.friction_bound[i] {
                 stiffness[i] = self.friction_stiffness[i];
             }
         }
@@ -218,13 +221,13 @@ impl JointConstraints {
     pub fn torques(&self, acceleration: &[f64; DOFS]) -> [f64; DOFS] {
         let mut torques = [0.0; DOFS];
         for i in 0..JOINTS {
-            let force = self.friction_stiffness[i] * (self.friction_target[i] - acceleration[i]);
-            torques[i] = force.clamp(-self.friction_bound[i], self.friction_bound[i]);
+            let torque = self.friction_stiffness[i] * (self.friction_target[i] - acceleration[i]);
+            torques[i] = torque.clamp(-self.friction_bound[i], self.friction_bound[i]);
         }
         if self.is_at_stop {
             for stop in self.stops.iter().flatten() {
-                let force = stop.stiffness * (stop.target - stop.sign * acceleration[stop.joint]);
-                torques[stop.joint] += stop.sign * force.max(0.0);
+                let torque = stop.stiffness * (stop.target - stop.sign * acceleration[stop.joint]);
+                torques[stop.joint] += stop.sign * torque.max(0.0);
             }
         }
         torques

@@ -32,7 +32,7 @@ use crate::{
     },
 };
 use arm::Arm;
-pub use bounds::{Bounds, Divergence, Runaway};
+pub use bounds::{Bounds, Divergence, DivergenceCause};
 pub use impacts::{ContactBody, Impact, Impacts};
 
 /// A mallet's striking cylinder: centre x, y, z (m) and velocity vx, vy (m/s), table frame.
@@ -50,7 +50,7 @@ pub struct World {
     arms: Vec<Arm>,
     puck: Puck,
     puck_damping: Damping,
-    /// State of robot 1's mallet, if its motion is given by the caller instead of computed.
+    /// State of robot 0's mallet, if its motion is given by the caller instead of computed.
     imposed_mallet: Option<MalletState>,
     /// Force of the air flow on the puck along x and y, N.
     air_n: [f64; 2],
@@ -127,8 +127,8 @@ impl World {
         }
     }
 
-    /// Imposes the motion of robot 1's mallet from now on, or lets its arm move it again (`None`). With an imposed mallet
-    /// robot 1's arm stays where it is.
+    /// Imposes the motion of robot 0's mallet from now on, or lets its arm move it again (`None`). With an imposed mallet
+    /// robot 0's arm stays where it is.
     pub fn impose_mallet(&mut self, mallet: Option<MalletState>) {
         self.imposed_mallet = mallet;
     }

@@ -85,14 +85,14 @@ impl ScalarSolutions {
     pub fn insert<T: Lanes>(
         &self,
         acceleration: &mut [T; DOFS],
-        constraint: &mut [T; DOFS],
+        constraint_torque: &mut [T; DOFS],
         load: &mut [T; DOFS],
     ) {
         for (lane, solved) in self.solutions.iter().enumerate() {
             let contains = |lanes: u32| lanes >> lane & 1 == 1;
             if contains(self.lanes) {
                 set_row(acceleration, lane, &solved.acceleration);
-                set_row(constraint, lane, &solved.constraint_torque);
+                set_row(constraint_torque, lane, &solved.constraint_torque);
             }
             if contains(self.lanes_in_contact) {
                 let mut torques = row(load, lane);

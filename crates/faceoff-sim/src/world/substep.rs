@@ -44,14 +44,14 @@ pub fn substep<T: Lanes, A>(
 
     let mut acceleration = ordinary_accelerations(arms, lane_worlds, &dynamics, scalar);
     // Torques of dry friction, and of stops in scalar lanes, N m.
-    let mut constraint = [T::splat(0.0); DOFS];
-    constraint[..JOINTS].copy_from_slice(&arms.friction.torques(&acceleration));
+    let mut constraint_torque = [T::splat(0.0); DOFS];
+    constraint_torque[..JOINTS].copy_from_slice(&arms.friction.torques(&acceleration));
     let mut load = dynamics.load;
     if scalar.lanes != 0 {
-        scalar.insert(&mut acceleration, &mut constraint, &mut load);
+        scalar.insert(&mut acceleration, &mut constraint_torque, &mut load);
     }
     for i in 0..DOFS {
-        load[i] += constraint[i];
+        load[i] += constraint_torque[i];
     }
 
     // Semi-implicit Euler step, with implicit joint damping.
@@ -108,15 +108,15 @@ fn arm_dynamics<T: Lanes, A>(
     let command = arms.limiter.limit(&desired);
     arms.torque = torque(plant, &command, q, dq_filtered, &feed_forward);
     let ee = &kinematics.end_effector;
-    let universal = arms
-        .universal
-        .torque(ee.x, ee.y, [q[7], q[8]], [dq[7], dq[8]]);
+    let universal_torque =
+        arms.universal_controller
+            .torque(ee.x, ee.y, [q[7], q[8]], [dq[7], dq[8]]);
     let mut load = [T::splat(0.0); DOFS];
     for i in 0..JOINTS {
         load[i] = arms.torque[i] - bias[i] - plant.damping[i] * dq[i];
     }
     for i in 0..2 {
-        load[7 + i] = universal[i] - bias[7 + i];
+        load[7 + i] = universal_torque[i] - bias[7 + i];
     }
     arms.friction.prepare(dq);
     arms.ee_before = ee.origin;
@@ -232,9 +232,9 @@ fn update_bound_sets<T: Lanes, A>(
                 let mut found = row(acceleration, lane);
                 search_bound_set(constraints, &dynamics.problem(lane), &mut found);
                 set_row(acceleration, lane, &found);
-                arms.friction.load(lane, constraints);
+                arms.friction.load_bound_set(lane, constraints);
             } else if scalar_lanes >> lane & 1 == 1 {
-                arms.friction.load(lane, constraints);
+                arms.friction.load_bound_set(lane, constraints);
             }
         }
     }
@@ -254,7 +254,7 @@ fn check_world<T: Lanes, A>(
     for (robot, arm) in world.arms.iter_mut().enumerate() {
         arms.store(lane_world.first_lane + robot, arm);
     }
-    let Some(cause) = world.find_runaway() else {
+    let Some(cause) = world.find_divergence_cause() else {
         return;
     };
     world.puck = puck_before;

@@ -29,7 +29,7 @@ impl Event {
             | Self::EvaluationDeadlineMissed { .. }
             | Self::EvaluationVoided { .. }
             | Self::EvaluationPublished
-            | Self::ExtraTurnGiven { .. }
+            | Self::ExtraEvaluationAdded { .. }
             | Self::DayStarted { .. }
             | Self::DayOverdue { .. }
             | Self::DayReleased
@@ -48,7 +48,7 @@ impl Event {
             | Self::TournamentResumed
             | Self::TournamentClosed
             | Self::TeamsEntered { .. }
-            | Self::TeamOut { .. }
+            | Self::EntrantRemoved { .. }
             | Self::TeamLeftTournament { .. }
             | Self::RoundStarted { .. }
             | Self::RoundOver { .. }
@@ -66,9 +66,9 @@ impl Event {
             | Self::TokenRevoked { .. }
             | Self::Invited { .. }
             | Self::InvitationRevoked { .. }
-            | Self::PersonJoined { .. }
-            | Self::PersonRenamed { .. }
-            | Self::PersonLeft { .. }
+            | Self::UserJoined { .. }
+            | Self::UserRenamed { .. }
+            | Self::UserLeft { .. }
             | Self::SignedIn
             | Self::PasswordSet
             | Self::TermsAccepted { .. }
@@ -86,9 +86,9 @@ impl Event {
             | Self::SubmissionWithdrawn
             | Self::SubmissionLabelled { .. }
             | Self::SubmissionNoted
-            | Self::SubmissionNotTaken { .. }
+            | Self::SubmissionExcluded { .. }
             | Self::SubmissionDeleted { .. }
-            | Self::ArchiveRemoved { .. }
+            | Self::BundleRemoved { .. }
             | Self::EvaluationQueued { .. }
             | Self::EvaluationBegun
             | Self::EvaluationScoringStarted
@@ -102,23 +102,23 @@ impl Event {
             | Self::ProposalDropped
             | Self::ShardCommitted { .. }
             // These also concern test games and friendly games, which are not public.
-            | Self::FreeGameQueued { .. }
+            | Self::TestOrFriendlyGameQueued { .. }
             | Self::GameBegun { .. }
             | Self::GamePlayed { .. }
-            | Self::GameBroken { .. }
+            | Self::GamePlatformFailed { .. }
             | Self::GameVoided { .. }
             | Self::GameQueuedAgain
             | Self::GameCancelled { .. }
             | Self::TournamentChanged { .. }
-            | Self::ReplaysOrdered { .. }
-            | Self::ReplaysCancelled { .. }
+            | Self::ScheduleReplaysRequested { .. }
+            | Self::ScheduleReplaysCancelled { .. }
             | Self::FriendlyGamesDeclined { .. }
             | Self::WebhookCreated { .. }
             | Self::WebhookChanged { .. }
             | Self::WebhookRotated { .. }
             | Self::WebhookRemoved { .. }
-            | Self::WebhookDied { .. }
-            | Self::JobReturned { .. } => false,
+            | Self::WebhookDisabled { .. }
+            | Self::JobFailed { .. } => false,
         }
     }
 }

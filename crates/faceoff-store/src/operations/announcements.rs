@@ -7,7 +7,7 @@ use crate::{
     store::Store,
     tables::{
         announcements::{self, Announcement},
-        questions::{self, Question, Reply},
+        questions::{self, Question, QuestionAnswer},
     },
 };
 use faceoff_types::{AnnouncementId, QuestionId, TeamId};
@@ -88,7 +88,7 @@ impl Store {
     ) -> Result<Question> {
         self.write(actor, now, async |tx| {
             questions::find(tx, id).await?;
-            let answer = Reply {
+            let answer = QuestionAnswer {
                 at: now,
                 text: text.to_owned(),
                 is_public,

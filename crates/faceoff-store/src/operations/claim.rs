@@ -29,15 +29,15 @@ use jiff::{SignedDuration, Timestamp};
 use uuid::Uuid;
 
 /// Number of leases of one job after which it is given up although no worker reported a failure: something in
-/// it kills its worker. The number is far above [`MAX_ATTEMPTS`](crate::MAX_ATTEMPTS): a server that is killed
+/// it kills its worker. The number is far above [`MAX_PLATFORM_FAULTS`](crate::MAX_PLATFORM_FAULTS): a server that is killed
 /// repeatedly for other reasons must not cost a team its evaluation.
 pub const MAX_LEASES: u32 = 50;
 
 impl Store {
-    /// Leases the next job for `lease_s` seconds. Scoring comes first. Validation runs and shards
-    /// of evaluations each get half of the slots (places for one job); within each half, teams get equal slot time. Shards
-    /// of ablations get the remaining slots. A job with an expired lease is leased again. `None`: there is
-    /// no job to run now (see [`Store::job_signal`]), or the queue is paused.
+    /// Leases the next job for `lease_s` seconds. Scoring comes first. Validation runs, shards of evaluations and games of rounds
+    /// share the slots (places for one job) equally; within each of these three kinds, teams get equal slot time. Ablations,
+    /// proposals and other games get the remaining slots. A job with an expired lease is leased again. `None`: there is no job to
+    /// run now (see [`Store::job_signal`]), or the queue is paused.
     #[boxed]
     pub async fn claim(
         &self,
@@ -124,7 +124,7 @@ async fn describe_job(tx: &mut Tx, leased: &LeasedJob, worker: &str) -> Result<O
                 mismatch: secret.model_mismatch(),
             };
             let all = stages::all(tx).await?;
-            let stage = stages::current(&all, tx.now).map(|stage| {
+            let ruleset_and_plan = stages::current(&all, tx.now).map(|stage| {
                 let mut plan = stage.plan();
                 // The submission can be evaluated in other stages, too. Each task has an agent of its own, which does not see the others.
                 let others = all
@@ -141,7 +141,7 @@ async fn describe_job(tx: &mut Tx, leased: &LeasedJob, worker: &str) -> Result<O
             Ok(Job::Validation {
                 submission,
                 seeds,
-                stage,
+                ruleset_and_plan,
                 runtimes,
             })
         }

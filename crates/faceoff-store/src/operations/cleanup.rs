@@ -1,4 +1,4 @@
-//! Periodic deletion of what is not needed any more: recordings, dropped datasets, refused bundles, and ended credentials.
+//! Periodic deletion of what is not needed any more: recordings, dropped datasets, bundles that failed validation, and ended credentials.
 
 use crate::{
     boxed,
@@ -18,7 +18,7 @@ use jiff::{SignedDuration, Timestamp};
 pub const RECORDINGS_KEPT_FOR: SignedDuration = SignedDuration::from_hours(24);
 
 /// Time for which a bundle is kept after a platform fault in its validation run, for investigation.
-pub const UNCHECKED_KEPT_FOR: SignedDuration = SignedDuration::from_hours(24);
+pub const PLATFORM_FAILED_BUNDLES_KEPT_FOR: SignedDuration = SignedDuration::from_hours(24);
 
 /// Time for which tokens, sessions and invitations are kept after their end. The log keeps their events.
 pub const ENDED_CREDENTIALS_KEPT_FOR: SignedDuration = SignedDuration::from_hours(30 * 24);
@@ -27,7 +27,7 @@ pub const ENDED_CREDENTIALS_KEPT_FOR: SignedDuration = SignedDuration::from_hour
 const FORGOTTEN_AT_ONCE: u32 = 500;
 
 /// Number of a team's invalid submissions whose logs are kept, the newest ones. A bundle of a few bytes can have a long log.
-pub const REFUSED_LOGS_KEPT: u32 = 50;
+pub const INVALID_LOGS_KEPT: u32 = 50;
 
 /// The time this much before `now`: what ended until then is not kept any more.
 pub(super) fn earlier(now: Timestamp, kept_for: SignedDuration) -> Timestamp {
@@ -87,25 +87,25 @@ impl Store {
     }
 
     /// Deletes the bundles of submissions that did not pass their validation run: at once if they are invalid, and
-    /// [`UNCHECKED_KEPT_FOR`] after a platform fault. The reason stays, and the log of a team's last [`REFUSED_LOGS_KEPT`];
+    /// [`PLATFORM_FAILED_BUNDLES_KEPT_FOR`] after a platform fault. The reason stays, and the log of a team's last [`INVALID_LOGS_KEPT`];
     /// identical bundles share one.
     /// Returns the number of bundles. An interrupted call is completed by the next one.
     #[boxed]
-    pub async fn remove_refused_bundles(&self, now: Timestamp) -> Result<usize> {
-        let ended_before = earlier(now, UNCHECKED_KEPT_FOR);
+    pub async fn remove_failed_bundles(&self, now: Timestamp) -> Result<usize> {
+        let ended_before = earlier(now, PLATFORM_FAILED_BUNDLES_KEPT_FOR);
         let mut connection = self.database.read.acquire().await?;
-        let refused = bundles::refused(&mut connection, ended_before).await?;
+        let failed = bundles::with_failed_validation(&mut connection, ended_before).await?;
         drop(connection);
-        for (id, key) in &refused {
+        for (id, key) in &failed {
             self.artifacts().delete(key).await?;
             self.write(Actor::Server, now, async |tx| {
-                bundles::set_refused_removed(tx, *id, now).await?;
+                bundles::set_failed_removed(tx, *id, now).await?;
                 submissions::share_log(tx, *id).await?;
-                submissions::forget_old_logs(tx, *id, REFUSED_LOGS_KEPT).await
+                submissions::forget_old_logs(tx, *id, INVALID_LOGS_KEPT).await
             })
             .await?;
         }
-        Ok(refused.len())
+        Ok(failed.len())
     }
 
     /// Deletes tokens, sessions and invitations that ended at least [`ENDED_CREDENTIALS_KEPT_FOR`] ago. Accepted invitations stay:

@@ -81,7 +81,7 @@ pub(crate) async fn end_run(
 
 async fn queue_scoring(tx: &mut Tx, id: EvaluationId) -> Result<()> {
     let account =
-        queue::open_account(tx, purpose::SCORING.lane, purpose::PLATFORM_ACCOUNT_HOLDER).await?;
+        queue::open_account(tx, purpose::SCORING.lane, purpose::PLATFORM_ACCOUNT_OWNER).await?;
     let job = queue::insert(tx, purpose::SCORING, account).await?;
     scorings::insert(tx, id, job).await
 }

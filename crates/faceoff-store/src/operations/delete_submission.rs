@@ -15,7 +15,7 @@ use crate::{
 use faceoff_types::{SubmissionId, TeamId};
 use jiff::Timestamp;
 
-/// Refuses to remove evidence against a team, and submissions of a team that an organiser has withdrawn.
+/// Refuses to remove evidence: submissions of a team that is disqualified, or that an organiser has retired.
 async fn check_no_evidence(tx: &mut Tx, team: TeamId) -> Result<()> {
     let reason = match teams::evidence(tx, team).await? {
         None => return Ok(()),

@@ -1,5 +1,5 @@
-//! The end of credentials with the rights of the user who made them. A *credential* is what gives access, or knowledge, without a
-//! password: a token, an invitation, a webhook.
+//! Revocation of the credentials that a user has created, when the user loses access or a token is revoked. A *credential* gives
+//! access, or knowledge, without a password: a token, an invitation, a webhook.
 
 use crate::{
     boxed,

@@ -108,7 +108,7 @@ impl Store {
             queue_evaluation(tx, new, &setup, 0).await?;
             evaluation_specs::set_extra(tx, id, reason).await?;
             let reason = reason.to_owned();
-            tx.record(Subject::Evaluation(id), Event::ExtraTurnGiven { reason });
+            tx.record(Subject::Evaluation(id), Event::ExtraEvaluationAdded { reason });
             queries::evaluations::find(tx, id).await
         })
         .await

@@ -85,7 +85,7 @@ impl Store {
             .pragma("cell_size_check", "ON");
         let read_only = options.clone().read_only(true);
         let mut connection = deadline.connect(&read_only).await?;
-        let checked = check_unchanged(&mut connection).await;
+        let checked = check_read_only(&mut connection).await;
         connection.close().await?;
         let page_count = deadline.refuse_if_passed(checked)?;
 
@@ -135,9 +135,9 @@ impl Deadline {
     }
 }
 
-/// Checks the database without writing. Nothing but the text of its schema is read before that is known to be the
-/// program's own: a view in place of a table could have any number of rows. The number of pages of the database.
-async fn check_unchanged(connection: &mut SqliteConnection) -> Result<u32> {
+/// Checks the database without writing, and returns its number of pages. Only the text of its schema is read until that is known to be
+/// the program's own, because a view in place of a table could have any number of rows.
+async fn check_read_only(connection: &mut SqliteConnection) -> Result<u32> {
     let found = schema(connection).await.map_err(refusal)?;
     if !has(&found, "archived") {
         return Err(refusal("it is not that of an archived season"));

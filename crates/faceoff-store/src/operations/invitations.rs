@@ -49,7 +49,7 @@ pub struct JoinRequest {
     /// Name of a new user; `None` for a returning one, who has a name.
     pub name: Option<UserName>,
     /// Password hash as a PHC string, if the user wants a password.
-    pub password: Option<String>,
+    pub password_hash: Option<String>,
     /// The new team, if the invitation is for a founder.
     pub team: Option<(TeamName, TeamProfile)>,
     /// Version of the terms that the user accepts.
@@ -67,7 +67,7 @@ pub struct JoinOutcome {
     /// The user's team; `None` for an organiser.
     pub team: Option<Team>,
     pub token: Token,
-    /// What a user who gets access again had made before.
+    /// The credentials that ended because the user got access again: those that the user had created before.
     pub ended: EndedCredentials,
 }
 
@@ -186,12 +186,12 @@ async fn add_user(tx: &mut Tx, request: &mut JoinRequest, team: Option<TeamId>) 
         team,
         joined_at: tx.now,
         left_at: None,
-        has_password: request.password.is_some(),
+        has_password: request.password_hash.is_some(),
         accepted_terms: request.accepted_terms,
     };
-    users::insert(tx, &user, request.password.as_deref()).await?;
+    users::insert(tx, &user, request.password_hash.as_deref()).await?;
     let (id, name) = (user.id, user.name);
-    tx.record(Subject::User(id), Event::PersonJoined { name, team });
+    tx.record(Subject::User(id), Event::UserJoined { name, team });
     Ok(id)
 }
 
@@ -212,8 +212,8 @@ async fn restore_access(
         return invalid_invitation(format!("{} has left", user.name));
     }
     revoke_all(tx, TokenOwner::User(id), None).await?;
-    if let Some(password) = &request.password {
-        users::set_password(tx, id, password).await?;
+    if let Some(password_hash) = &request.password_hash {
+        users::set_password(tx, id, password_hash).await?;
         tx.record(Subject::User(id), Event::PasswordSet);
     }
     revoke_created_by(tx, id, None, "the user who made it got new access").await

@@ -28,7 +28,7 @@ pub enum Job {
         seeds: RunSeeds,
         /// The ruleset and the plan of an evaluation in the current stage, which the validation run resembles, with the tasks of all
         /// stages that are not closed; `None` if there is no stage.
-        stage: Option<Box<(Ruleset, RunPlan)>>,
+        ruleset_and_plan: Option<Box<(Ruleset, RunPlan)>>,
         /// Accepted runtimes of each stage that the submission could be evaluated in; it is invalid if none of them
         /// accepts its runtime. Empty if a stage accepts any runtime.
         runtimes: Vec<StageRuntimes>,

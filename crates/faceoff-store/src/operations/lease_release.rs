@@ -21,7 +21,7 @@ use sqlx::SqliteConnection;
 use uuid::Uuid;
 
 /// Number of platform faults after which a job is given up.
-pub const MAX_ATTEMPTS: u32 = 5;
+pub const MAX_PLATFORM_FAULTS: u32 = 5;
 
 /// Pause before a job that met a full disk is run again, seconds. Without it a job that needs more disk
 /// space than there is would take up every slot.
@@ -97,13 +97,13 @@ pub(crate) async fn requeue_leases_of(tx: &mut Tx, holder: &str) -> Result<u64> 
 
 impl Store {
     /// Releases a job after a platform fault: it returns to the queue after a growing pause. After
-    /// [`MAX_ATTEMPTS`] failures an evaluation ends as
+    /// [`MAX_PLATFORM_FAULTS`] failures an evaluation ends as
     /// [`PlatformFailed`](crate::EvaluationState::PlatformFailed) and is rerun a limited number of times
     /// ([`RERUN_PAUSES_S`](crate::RERUN_PAUSES_S)). A validation run ends as
     /// [`PlatformFailed`](crate::SubmissionState::PlatformFailed), an ablation ends without a result. For a lost lease
     /// nothing is recorded.
     #[boxed]
-    pub async fn release_failed(
+    pub async fn release_after_platform_fault(
         &self,
         claim: &JobClaim,
         reason: &str,
@@ -116,7 +116,7 @@ impl Store {
             };
             let purpose = purpose::of_job(tx, claim.job, &kind).await?;
             let failures = queue::requeue_failed(tx, claim, now).await?;
-            let event = Event::JobReturned {
+            let event = Event::JobFailed {
                 job: claim.job,
                 failures,
                 reason: reason.to_owned(),
@@ -127,7 +127,7 @@ impl Store {
                 game_lifecycle::end_attempt(tx, id, AttemptOutcome::PlatformFailed, Some(reason))
                     .await?;
             }
-            if failures >= MAX_ATTEMPTS {
+            if failures >= MAX_PLATFORM_FAULTS {
                 give_up(tx, claim.job, &kind, reason).await?;
             }
             Ok(())

@@ -37,7 +37,7 @@ pub(crate) async fn void(tx: &mut Tx, id: EvaluationId, reason: &str) -> Result<
 }
 
 /// Disqualifies a team from the tournaments that are not closed.
-async fn leave_tournaments(tx: &mut Tx, team: TeamId, reason: &str) -> Result<()> {
+async fn disqualify_from_tournaments(tx: &mut Tx, team: TeamId, reason: &str) -> Result<()> {
     let departure = DepartureRequest {
         team,
         kind: DepartureKind::Disqualified,
@@ -48,7 +48,7 @@ async fn leave_tournaments(tx: &mut Tx, team: TeamId, reason: &str) -> Result<()
     for tournament in tournaments.filter(|tournament| tournament.closed_at.is_none()) {
         let entrants = entrants::all(tx, tournament.id).await?;
         let rounds = rounds::count(tx, tournament.id).await?;
-        // A team that withdraws may play the round under way to its end.
+        // Not a team that has left, unless its games of the current round still count.
         let takes_part = entrants.iter().any(|entrant| {
             let plays = entrant.departure.as_ref().is_none_or(|departure| {
                 tournament.rules.finishes_round(departure.kind)
@@ -153,7 +153,7 @@ impl Store {
                 let cancelled = Failure::Cancelled(&cancellation_reason);
                 completion::fail_evaluation(tx, evaluation, cancelled).await?;
             }
-            leave_tournaments(tx, id, &cancellation_reason).await?;
+            disqualify_from_tournaments(tx, id, &cancellation_reason).await?;
             let reason = decision.reason;
             tx.record(Subject::Team(id), Event::TeamDisqualified { reason });
             teams::find(tx, id).await

@@ -38,7 +38,7 @@ pub enum Reevaluation {
     /// All counting evaluations of a day.
     Day(StageDay),
     /// All counting evaluations of a day, with the newest rules of its stage.
-    Rules(StageDay),
+    DayWithNewestRules(StageDay),
 }
 
 /// One evaluation of a proposal, before it is queued.
@@ -83,7 +83,7 @@ async fn add_proposal(tx: &mut Tx, proposal: &Proposal, proposed: Vec<ProposedRu
 
 /// Runs that repeat these evaluations, each with the revision of its rules: those of the stage `newest`, if it is given,
 /// or else the evaluation's own.
-async fn runs_to_repeat(
+async fn reevaluation_runs(
     tx: &mut Tx,
     ids: &[EvaluationId],
     newest: Option<&Stage>,
@@ -211,7 +211,9 @@ impl Store {
             season::check_open(tx).await?;
             let stage_day = match scope {
                 Reevaluation::Evaluation(id) => evaluation_specs::find(tx, id).await?.stage_day,
-                Reevaluation::Day(stage_day) | Reevaluation::Rules(stage_day) => stage_day,
+                Reevaluation::Day(stage_day) | Reevaluation::DayWithNewestRules(stage_day) => {
+                    stage_day
+                }
             };
             sign_offs::check_not_signed_off(tx, stage_day.stage).await?;
             let stage = stages::find(tx, stage_day.stage).await?;
@@ -228,14 +230,14 @@ impl Store {
                 .map(|evaluation| evaluation.id)
                 .filter(|id| match scope {
                     Reevaluation::Evaluation(single) => *id == single,
-                    Reevaluation::Day(_) | Reevaluation::Rules(_) => true,
+                    Reevaluation::Day(_) | Reevaluation::DayWithNewestRules(_) => true,
                 })
                 .collect();
             let newest = match scope {
-                Reevaluation::Rules(_) => Some(&stage),
+                Reevaluation::DayWithNewestRules(_) => Some(&stage),
                 _ => None,
             };
-            let proposed = runs_to_repeat(tx, &counting, newest).await?;
+            let proposed = reevaluation_runs(tx, &counting, newest).await?;
             let Some(revision) = proposed.iter().map(|(revision, _)| *revision).max() else {
                 return StoreError::conflict(if newest.is_some() && !counting.is_empty() {
                     "there is nothing to re-evaluate: the counting results of that day have the stage's newest rules, or their submissions were deleted or are not accepted by these rules"
@@ -246,7 +248,9 @@ impl Store {
             let kind = match scope {
                 Reevaluation::Evaluation(_) => ProposalKind::Evaluation(stage_day.date),
                 Reevaluation::Day(_) => ProposalKind::Day(stage_day.date),
-                Reevaluation::Rules(_) => ProposalKind::Rules(stage_day.date),
+                Reevaluation::DayWithNewestRules(_) => {
+                    ProposalKind::DayWithNewestRules(stage_day.date)
+                }
             };
             let proposal = Proposal {
                 id: ProposalId::new(),
@@ -370,7 +374,7 @@ async fn apply_evaluation(
     };
     if let (Some(replaced), false) = (
         evaluation.replaces,
-        matches!(proposal.kind, ProposalKind::Rules(_)),
+        matches!(proposal.kind, ProposalKind::DayWithNewestRules(_)),
     ) {
         let counting = counting_evaluations::of_day(tx, stage_day, Some(evaluation.team)).await?;
         if !counting

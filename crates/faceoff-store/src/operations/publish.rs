@@ -33,7 +33,7 @@ impl Store {
             }
             if stage.settings.blind {
                 return StoreError::conflict(
-                    "the stage is blind: no dataset is published before the organiser opens it",
+                    "the stage is blind: no dataset is published before an organiser reveals the stage",
                 );
             }
             if evaluation.released_at.is_none() {

@@ -46,12 +46,12 @@ impl JobKind {
     }
 }
 
-/// A lane with its stored name. Of two equally served lanes, the one with the smaller `rank` is next.
-const fn lane(name: &'static str, urgency: u32, rank: u32) -> Lane {
+/// A lane with its stored name. Of two equally served lanes, the one with the smaller `tie_breaker` is next.
+const fn lane(name: &'static str, urgency: u32, tie_breaker: u32) -> Lane {
     Lane {
         name,
         urgency,
-        rank,
+        tie_breaker,
     }
 }
 
@@ -93,7 +93,7 @@ impl JobFilter {
 }
 
 /// Owner of the account of scoring jobs: they belong to no team, and run in the order in which they were queued.
-pub(crate) const PLATFORM_ACCOUNT_HOLDER: &str = "";
+pub(crate) const PLATFORM_ACCOUNT_OWNER: &str = "";
 
 /// The submission, game, shard or evaluation that a job is for.
 #[derive(Debug)]

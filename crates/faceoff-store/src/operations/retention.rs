@@ -312,7 +312,7 @@ async fn mark_removed(tx: &mut Tx, id: StageId) -> Result<RemovalSummary> {
     for id in plan.bundles {
         bundles::set_removed(tx, id, &reason, now).await?;
         let reason = reason.clone();
-        tx.record(Subject::Submission(id), Event::ArchiveRemoved { reason });
+        tx.record(Subject::Submission(id), Event::BundleRemoved { reason });
     }
     Ok(plan.removed)
 }

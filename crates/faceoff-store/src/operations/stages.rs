@@ -106,7 +106,7 @@ async fn create(tx: &mut Tx, stage: &Stage) -> Result<()> {
     Ok(())
 }
 
-/// Does the change only open a blind stage (one with hidden scores), or publish datasets earlier?
+/// Does the change only reveal a blind stage (one with hidden scores), or publish datasets earlier?
 fn only_increases_visibility(stage: &Stage, changed: &Stage) -> bool {
     let more_visible = Stage {
         settings: StageSettings {
@@ -150,7 +150,7 @@ async fn change(
         rules == stage.rules.rules && only_increases_visibility(stage, &changed);
     if phase == StagePhase::Closed && !increases_visibility {
         return StoreError::conflict(format!(
-            "the stage {:?} closed at {}, and a closed stage cannot be changed, except to open a blind one or to publish \
+            "the stage {:?} closed at {}, and a closed stage cannot be changed, except to reveal a blind one or to publish \
              datasets earlier. Create another stage",
             stage.name.as_str(),
             stage.closes_at.unwrap_or(now)
@@ -270,7 +270,7 @@ impl Store {
                     since: opens_at,
                     rules: new.rules,
                 },
-                names_seeds: true,
+                seeds_derive_from_id: true,
                 configured: false,
                 sign_off: None,
             };
@@ -337,14 +337,14 @@ impl Store {
                         since: truncate(now),
                         rules,
                     },
-                    names_seeds: true,
+                    seeds_derive_from_id: true,
                     configured: true,
                     sign_off: None,
                 };
                 return create(tx, &first).await;
             };
             if stages::revisions(tx, id).await?.is_empty() {
-                // Databases from before there were stages have no evaluations.
+                // A stage without revisions was created by the migration from a database without evaluations.
                 let first = Revision {
                     number: 1,
                     since: now,

@@ -110,7 +110,7 @@ pub(crate) async fn start(
     let mut started = Vec::new();
     for submission in submissions::active(tx).await? {
         if let Err(refusal) = stage.check_accepts(&submission) {
-            let event = Event::SubmissionNotTaken {
+            let event = Event::SubmissionExcluded {
                 stage: stage_day.stage,
                 day: stage_day.date,
                 reason: refusal.to_string(),

@@ -12,7 +12,7 @@ use crate::{
     store::Store,
     tables::{
         teams::{self, Team},
-        tokens::{self, Token, TokenKind, TokenOwner, TokensOf},
+        tokens::{self, Token, TokenFilter, TokenKind, TokenOwner},
         users::{self, User},
     },
     write::Tx,
@@ -59,13 +59,13 @@ pub struct NewToken {
     pub expires_at: Option<Timestamp>,
 }
 
-/// What happens to the credentials that were created with a revoked token.
+/// What the revocation of a token covers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum CreatedCredentials {
-    /// They stay.
-    Keep,
-    /// They end, except the token of the request.
-    EndExcept(Option<TokenId>),
+pub enum RevocationExtent {
+    /// The token only; the credentials that were created with it stay valid.
+    TokenOnly,
+    /// Also the credentials that were created with it, except the token of the request.
+    WithCreatedExcept(Option<TokenId>),
 }
 
 /// A token that was revoked, and what ended with it.
@@ -235,18 +235,18 @@ impl Store {
             .await
     }
 
-    /// Creates the session of a user whose password has been verified as `verified`, its stored form. False if the user has another
-    /// password by now, or has left.
+    /// Creates the session of a user whose password has been verified against `verified_hash`, its stored form. False if the user has
+    /// another password by now, or has left.
     #[boxed]
     pub async fn sign_in(
         &self,
         id: UserId,
-        verified: &str,
+        verified_hash: &str,
         new: NewToken,
         now: Timestamp,
     ) -> Result<bool> {
         self.write(Actor::User(id), now, async |tx| {
-            if users::password_of(tx, id).await?.as_deref() != Some(verified) {
+            if users::password_hash_of(tx, id).await?.as_deref() != Some(verified_hash) {
                 return Ok(false);
             }
             add_token(tx, new).await?;
@@ -261,9 +261,9 @@ impl Store {
         requester::is_valid(&mut *self.database.read.acquire().await?, requester, now).await
     }
 
-    /// Replaces the secret of a token; the old secret is invalid from now on, and its expiry remains. From now on it belongs to
-    /// what the requester has made, unless its creator is the same or it renews itself. [`StoreError::Conflict`] if the token is a session,
-    /// is expired or revoked, or is the operator's, whose file would still have the old secret.
+    /// Replaces the secret of a token; the old secret is invalid from now on, and its expiry remains. The requester becomes its
+    /// creator, unless the requester created it or is authenticated by this very token. [`StoreError::Conflict`] if the token is a
+    /// session, is expired or revoked, or is the operator's, whose file would still have the old secret.
     #[boxed]
     pub async fn rotate_token(
         &self,
@@ -274,11 +274,13 @@ impl Store {
         now: Timestamp,
     ) -> Result<Token> {
         self.write(actor, now, async |tx| {
-            let new_maker = requester::check(tx, &requester, now).await?;
+            let requester_as_creator = requester::check(tx, &requester, now).await?;
             let token = tokens::find(tx, id).await?;
-            // Otherwise tokens made with a stolen one could cut themselves off from it.
-            let is_same = new_maker.token == Some(id) || new_maker.user == token.creator.user;
-            let creator = if is_same { token.creator } else { new_maker };
+            // Otherwise a token that was created with a stolen token could rotate itself, and would then survive the revocation of the
+            // stolen one.
+            let is_same = requester_as_creator.token == Some(id)
+                || requester_as_creator.user == token.creator.user;
+            let creator = if is_same { token.creator } else { requester_as_creator };
             if token.kind == TokenKind::Session {
                 return StoreError::conflict(
                     "a session has no secret that could be rotated: end it, or sign in again",
@@ -312,7 +314,7 @@ impl Store {
         &self,
         actor: Actor,
         id: TokenId,
-        made: CreatedCredentials,
+        extent: RevocationExtent,
         now: Timestamp,
     ) -> Result<RevokedToken> {
         self.write(actor, now, async |tx| {
@@ -320,9 +322,9 @@ impl Store {
             if token.revoked_at.is_none() {
                 revoke_token(tx, &token).await?;
             }
-            let ended = match made {
-                CreatedCredentials::Keep => EndedCredentials::default(),
-                CreatedCredentials::EndExcept(kept) => {
+            let ended = match extent {
+                RevocationExtent::TokenOnly => EndedCredentials::default(),
+                RevocationExtent::WithCreatedExcept(kept) => {
                     let reason = "the token with which it was made was revoked";
                     revoke_created_with(tx, id, kept, reason).await?
                 }
@@ -368,7 +370,7 @@ impl Store {
     /// The tokens and sessions that are valid at `now`, the newest first. Their number is bounded: an owner has at most
     /// [`MAX_TOKENS`].
     #[boxed]
-    pub async fn valid_tokens(&self, of: TokensOf, now: Timestamp) -> Result<Vec<Token>> {
+    pub async fn valid_tokens(&self, of: TokenFilter, now: Timestamp) -> Result<Vec<Token>> {
         tokens::valid(&mut *self.database.read.acquire().await?, of, now).await
     }
 
@@ -377,7 +379,7 @@ impl Store {
     #[boxed]
     pub async fn tokens_after(
         &self,
-        of: TokensOf,
+        of: TokenFilter,
         after: Option<TokenId>,
         limit: u32,
     ) -> Result<Option<Vec<Token>>> {

@@ -42,20 +42,20 @@ impl Store {
         users::find_with_password(&mut *self.database.read.acquire().await?, name).await
     }
 
-    /// Sets a user's password, as a PHC string (a hash with its parameters). All tokens and sessions of the user are revoked, and, if the
-    /// user had a password before, all that the user has made ends, except `used_token`, which authenticated this request.
+    /// Sets a user's password, given as a PHC string (a hash with its parameters). All tokens and sessions of the user are revoked, and, if
+    /// the user had a password before, all that the user has made ends, except `used_token`, which authenticated this request.
     #[boxed]
     pub async fn set_password(
         &self,
         actor: Actor,
         id: UserId,
-        password: &str,
+        password_hash: &str,
         used_token: TokenId,
         now: Timestamp,
     ) -> Result<(User, EndedCredentials)> {
         self.write(actor, now, async |tx| {
-            let had_password = users::password_of(tx, id).await?.is_some();
-            users::set_password(tx, id, password).await?;
+            let had_password = users::password_hash_of(tx, id).await?.is_some();
+            users::set_password(tx, id, password_hash).await?;
             revoke_all(tx, TokenOwner::User(id), Some(used_token)).await?;
             tx.record(Subject::User(id), Event::PasswordSet);
             let reason = "the user who made it has set a new password";
@@ -64,7 +64,7 @@ impl Store {
             } else {
                 EndedCredentials::default()
             };
-            // The user is the same, so accounts of others are no news.
+            // After a change of one's own password the accounts of invited users are not reported.
             ended.remaining_users.clear();
             ended.restored_users.clear();
             Ok((users::find(tx, id).await?, ended))
@@ -89,7 +89,7 @@ impl Store {
             }
             if name != user.name {
                 users::set_name(tx, id, &name).await?;
-                let event = Event::PersonRenamed {
+                let event = Event::UserRenamed {
                     from: user.name,
                     to: name,
                 };
@@ -128,7 +128,7 @@ impl Store {
                 ));
             }
             let name = user.name;
-            tx.record(Subject::User(id), Event::PersonLeft { name });
+            tx.record(Subject::User(id), Event::UserLeft { name });
             Ok((users::find(tx, id).await?, ended))
         })
         .await

@@ -50,7 +50,8 @@ impl Store {
                         ..
                     } = submissions::find(tx, id).await?;
                     if withdrawn_at.is_none()
-                        && active_submissions::put_newest(tx, team, id, created_at).await?
+                        && active_submissions::activate_unless_superseded(tx, team, id, created_at)
+                            .await?
                     {
                         tx.record(subject, Event::SubmissionActivated);
                     }

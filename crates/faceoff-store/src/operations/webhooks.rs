@@ -55,7 +55,7 @@ pub struct WebhookChange {
     pub topics: Option<Vec<String>>,
     /// Enables a disabled webhook again, for events from now on.
     pub enable: bool,
-    /// Whose webhook it is from now on, with another address or enabled again.
+    /// It becomes the webhook's creator if the address changes or the webhook is enabled again.
     pub requester: Requester,
 }
 
@@ -120,7 +120,7 @@ pub(crate) async fn disable(tx: &mut Tx, mut webhook: Webhook, reason: String) -
         reason: reason.clone(),
     });
     webhooks::update(tx, &webhook).await?;
-    let event = Event::WebhookDied {
+    let event = Event::WebhookDisabled {
         webhook: webhook.id,
         reason,
     };
@@ -142,7 +142,7 @@ impl Store {
 
     /// Secrets that sign a webhook's messages at `now`.
     #[boxed]
-    pub async fn webhook_keys(&self, id: WebhookId, now: Timestamp) -> Result<WebhookSecrets> {
+    pub async fn webhook_secrets(&self, id: WebhookId, now: Timestamp) -> Result<WebhookSecrets> {
         webhooks::secrets(&mut *self.database.read.acquire().await?, id, now).await
     }
 

@@ -50,7 +50,7 @@ impl Store {
                 let event = Event::WorkerBanned {
                     worker: ban.worker,
                     reason: ban.reason,
-                    again: u32::try_from(discarded.len()).unwrap_or(u32::MAX),
+                    repeated_shards: u32::try_from(discarded.len()).unwrap_or(u32::MAX),
                 };
                 tx.record(Subject::Season, event);
                 Ok(discarded)

@@ -33,7 +33,7 @@ pub struct BoardRecord {
     /// When the day was released; `None` if it is not.
     pub released_at: Option<Timestamp>,
     /// The reason of an extra evaluation; `None` for the team's regular one of the day.
-    pub extra_for: Option<String>,
+    pub extra_reason: Option<String>,
     /// Does it repeat an evaluation of the day, and was requested after the release, when the day's seed was public?
     pub rerun_after_release: bool,
     /// When the evaluation was scored.
@@ -87,7 +87,7 @@ impl From<BoardRow> for BoardRecord {
             run: row.run,
             day: row.day.0,
             released_at: row.released_at.map(|at| at.0),
-            extra_for: row.extra_for,
+            extra_reason: row.extra_for,
             rerun_after_release: row.rerun_after_release,
             finished_at: row.finished_at.0,
             result: row.result.0,

@@ -44,7 +44,7 @@ impl Store {
     pub async fn future_day(&self, stage: &Stage, now: Timestamp) -> Result<Option<Day>> {
         let today = stage.day(now).date;
         let mut connection = self.database.read.acquire().await?;
-        let newest = days::newest_binding(&mut connection, stage.id, today).await?;
+        let newest = days::newest_blocking(&mut connection, stage.id, today).await?;
         Ok(newest.filter(|day| day.stage_day.date > today))
     }
 
@@ -58,7 +58,7 @@ impl Store {
     ) -> Result<Option<(Date, Option<Timestamp>)>> {
         let today = stage.day(now).date;
         let mut connection = self.database.read.acquire().await?;
-        let newest = days::newest_binding(&mut connection, stage.id, today).await?;
+        let newest = days::newest_blocking(&mut connection, stage.id, today).await?;
         let mut newest = newest.map(|day| day.stage_day.date);
         loop {
             let next = stage.next_cutoff(newest, now);

@@ -73,14 +73,14 @@ pub struct EvaluationBacklog {
 /// An open job with its purpose.
 struct OpenJob {
     account: i64,
-    /// Time of the cutoff or request for which the job was queued, in milliseconds, or 0. Within an account, jobs of a smaller batch
-    /// come first; within a batch, those with a smaller `queue_no`.
+    /// Jobs of a smaller batch come first within a lane; within a batch and account, those with a smaller `queue_no`. The batch is the
+    /// time of the cutoff or request in milliseconds, the matchday or replay number of a game, or 0.
     batch: i64,
     queue_no: i64,
     is_leased: bool,
     /// For a leased job: when its lease expires.
     claimable_at: Instant,
-    /// Slot time charged to the account so far, including the rest of the lease.
+    /// Slot time charged for this job so far, including the rest of its lease.
     charged_ms: i64,
     /// Urgency of its lane: smaller ones are served first.
     urgency: u32,
@@ -115,7 +115,7 @@ async fn open_jobs(connection: &mut SqliteConnection) -> Result<Vec<OpenJob>> {
 }
 
 /// All accounts by number, without their jobs. Lanes with a smaller urgency are always served first; of two equally served lanes of one
-/// urgency, the one with the smaller rank.
+/// urgency, the one with the smaller tie-breaker.
 async fn accounts(connection: &mut SqliteConnection) -> Result<BTreeMap<i64, AccountQueue>> {
     let rows = sqlx::query!(
         "SELECT a.account_no, a.lane, l.urgency, l.rank, l.served_ms AS of_lane, a.served_ms
@@ -135,7 +135,7 @@ async fn accounts(connection: &mut SqliteConnection) -> Result<BTreeMap<i64, Acc
             let account = AccountQueue {
                 lane,
                 urgency: row.urgency,
-                rank: row.rank,
+                tie_breaker: row.rank,
                 lane_served_ms: row.of_lane as f64,
                 served_ms: row.served_ms as f64,
                 waiting: Default::default(),
@@ -164,10 +164,9 @@ const SCORING_URGENCY: u32 = 0;
 /// Mean duration of an episode of an open evaluation, in milliseconds: in its committed shards, or else in its team's
 /// recent episodes.
 fn episode_ms(evaluation: &OpenEvaluation, durations: &JobDurations) -> Option<f64> {
-    let (episodes, ms) = evaluation.done;
-    match episodes {
+    match evaluation.done_episodes {
         0 => durations.episode_ms_of(evaluation.team),
-        _ => Some(ms as f64 / f64::from(episodes)),
+        episodes => Some(evaluation.done_ms as f64 / f64::from(episodes)),
     }
 }
 
@@ -250,7 +249,7 @@ impl<'a> JobGroups<'a> {
 
 impl OpenJob {
     /// The remaining duration of a running job, by the time since its claim. Not by the episodes that it has reported: teams see the
-    /// forecast, and an agent could speak to its team by the pace of its episodes.
+    /// forecast, and an agent could signal to its team by the timing of its episodes.
     fn remaining_ms(&self, duration: DurationMs, now: Timestamp) -> DurationMs {
         let duration_ms = duration?;
         let lease_rest_ms = self.claimable_at.0.as_millisecond() - now.as_millisecond();

@@ -21,8 +21,8 @@ pub(crate) struct AccountQueue {
     pub(crate) lane: usize,
     /// Lanes with a smaller urgency are always served first.
     pub(crate) urgency: u32,
-    /// Of two equally served lanes, the one with the smaller rank is served first.
-    pub(crate) rank: u32,
+    /// Of two equally served lanes, the one with the smaller value is served first.
+    pub(crate) tie_breaker: u32,
     pub(crate) lane_served_ms: f64,
     pub(crate) served_ms: f64,
     /// By batch, then in queue order.
@@ -215,7 +215,7 @@ impl Forecast {
                     .lane_served_ms
                     .total_cmp(&account_b.lane_served_ms),
             )
-            .then(account_a.rank.cmp(&account_b.rank))
+            .then(account_a.tie_breaker.cmp(&account_b.tie_breaker))
             .then(job_a.batch.cmp(&job_b.batch))
             .then(account_a.served_ms.total_cmp(&account_b.served_ms))
             .then(job_a.queue_no.cmp(&job_b.queue_no))
@@ -248,11 +248,11 @@ mod tests {
     use super::*;
 
     /// An account with waiting jobs: batch, number in the queue, duration in milliseconds, and index of the group of each.
-    fn account(lane: usize, rank: u32, waiting: &[(i64, i64, f64, usize)]) -> AccountQueue {
+    fn account(lane: usize, tie_breaker: u32, waiting: &[(i64, i64, f64, usize)]) -> AccountQueue {
         AccountQueue {
             lane,
             urgency: 1,
-            rank,
+            tie_breaker,
             lane_served_ms: 0.0,
             served_ms: 0.0,
             waiting: waiting

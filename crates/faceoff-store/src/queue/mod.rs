@@ -1,7 +1,7 @@
 //! The job queue. A worker claims a job and gets a lease of some seconds, which it renews until the job is released or
 //! done. The purpose of a job is in the tables that refer to it. To the queue, its kind and its owner are
-//! opaque labels. Slot time is shared fairly: first among lanes, which are classes of urgency, then among the accounts of a lane, one for each
-//! owner (a team) with jobs.
+//! opaque labels. Slot time is shared fairly: first among the lanes (queues for one class of jobs) of the smallest urgency value, then
+//! among the accounts of a lane, one for each owner (a team or a tournament) with jobs.
 
 mod due_times;
 pub(crate) mod forecast;

@@ -12,7 +12,7 @@ pub(crate) struct Lane {
     /// Lanes with a smaller value are always served first.
     pub(crate) urgency: u32,
     /// Of two equally served lanes, the one with the smaller value is served first.
-    pub(crate) rank: u32,
+    pub(crate) tie_breaker: u32,
 }
 
 /// The number of an account: the record of the slot time that one owner (a team) has used in one lane, as in the fair-share scheduling of
@@ -20,11 +20,11 @@ pub(crate) struct Lane {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SlotTimeAccount(pub(crate) i64);
 
-/// Opens the account of `holder` (the owner) in `lane`, to queue jobs. An account that returns after a pause starts with
+/// Opens the account of `owner` in `lane`, to queue jobs. An account that returns after a pause starts with
 /// the served time of the least served account that has waiting jobs, or else of the most served one. So unused time is no
 /// credit, and time used while no other account waited is no debt. The same holds for lanes. The charged rest of a running
 /// lease does not count as used.
-pub(crate) async fn open_account(tx: &mut Tx, lane: Lane, holder: &str) -> Result<SlotTimeAccount> {
+pub(crate) async fn open_account(tx: &mut Tx, lane: Lane, owner: &str) -> Result<SlotTimeAccount> {
     let now = Instant(tx.now);
     sqlx::query!(
         "INSERT INTO lanes (lane, urgency, rank, served_ms)
@@ -44,7 +44,7 @@ pub(crate) async fn open_account(tx: &mut Tx, lane: Lane, holder: &str) -> Resul
                                           served_ms = MAX(served_ms, excluded.served_ms)",
         lane.name,
         lane.urgency,
-        lane.rank,
+        lane.tie_breaker,
         now,
     )
     .execute(&mut **tx)
@@ -65,7 +65,7 @@ pub(crate) async fn open_account(tx: &mut Tx, lane: Lane, holder: &str) -> Resul
            ON CONFLICT (lane, holder) DO UPDATE SET served_ms = MAX(served_ms, excluded.served_ms)
            RETURNING account_no AS "account_no!: i64""#,
         lane.name,
-        holder,
+        owner,
         now,
     )
     .fetch_one(&mut **tx)

@@ -7,7 +7,7 @@ use sqlx::SqliteConnection;
 
 /// Makes a submission that passed its validation its team's active one. Returns false if the team has a newer
 /// submission, or has chosen one since this upload.
-pub(crate) async fn put_newest(
+pub(crate) async fn activate_unless_superseded(
     connection: &mut SqliteConnection,
     team: TeamId,
     submission: SubmissionId,

@@ -101,7 +101,7 @@ pub(crate) async fn usage(
 /// Submissions that did not pass their validation and whose bundles are stored, with their keys. These are invalid ones,
 /// and those uploaded until `uploaded_until` whose validation ended by a platform fault. Bundles that are used by a run or
 /// another submission, and those of teams under investigation, are left out.
-pub(crate) async fn refused(
+pub(crate) async fn with_failed_validation(
     connection: &mut SqliteConnection,
     uploaded_until: Timestamp,
 ) -> Result<Vec<(SubmissionId, String)>> {
@@ -125,7 +125,7 @@ pub(crate) async fn refused(
         .collect())
 }
 
-pub(crate) async fn set_refused_removed(
+pub(crate) async fn set_failed_removed(
     connection: &mut SqliteConnection,
     id: SubmissionId,
     now: Timestamp,

@@ -111,9 +111,9 @@ pub(crate) async fn newest(
     Ok(row.map(Day::from))
 }
 
-/// The newest day of a stage that prevents days before it: each day is after all others, so that none is started twice after
+/// The newest day of a stage that blocks dates before it: each day is after all others, so that none is started twice after
 /// a clock was set back. A day after `today` exists only because a clock was ahead; it is ignored if nothing of it counts.
-pub(crate) async fn newest_binding(
+pub(crate) async fn newest_blocking(
     connection: &mut SqliteConnection,
     stage: StageId,
     today: Date,
@@ -218,7 +218,7 @@ pub(crate) async fn insert(
     deadline_at: Option<Timestamp>,
     now: Timestamp,
 ) -> Result<()> {
-    if let Some(newest) = newest_binding(connection, stage_day.stage, stage_day.date).await?
+    if let Some(newest) = newest_blocking(connection, stage_day.stage, stage_day.date).await?
         && newest.stage_day.date >= stage_day.date
     {
         return Err(StoreError::CutoffPassed {

@@ -51,9 +51,8 @@ pub(crate) async fn find(
     })
 }
 
-/// The day's place is taken: [`StoreError::Conflict`] if the team has another evaluation on that day which counts or is
-/// open.
-fn one_per_day(date: Date) -> impl FnOnce(sqlx::Error) -> StoreError {
+/// The error if the team has another evaluation on that day which counts or is open: [`StoreError::Conflict`].
+fn day_taken_error(date: Date) -> impl FnOnce(sqlx::Error) -> StoreError {
     StoreError::if_duplicate("evaluations.day", move || {
         StoreError::Conflict(format!(
             "the team has another evaluation on {date} that counts or is running"
@@ -84,7 +83,7 @@ pub(crate) async fn insert(
     )
     .execute(connection)
     .await
-    .map_err(one_per_day(spec.stage_day.date))?;
+    .map_err(day_taken_error(spec.stage_day.date))?;
     Ok(())
 }
 
@@ -140,7 +139,7 @@ pub(crate) async fn set_counting(
     )
     .execute(connection)
     .await
-    .map_err(one_per_day(date))?;
+    .map_err(day_taken_error(date))?;
     Ok(())
 }
 

@@ -37,7 +37,7 @@ pub struct Evaluation {
     /// When it was queued.
     pub created_at: Timestamp,
     /// The reason of an extra evaluation; `None` for the team's regular evaluation of the day.
-    pub extra_for: Option<String>,
+    pub extra_reason: Option<String>,
     /// Set if it was voided and does not count.
     pub voided: Option<DecisionRecord>,
     /// When its team published its dataset.
@@ -293,7 +293,7 @@ impl EvaluationRow {
             run: self.run_id,
             plan,
             created_at: self.created_at.0,
-            extra_for: self.extra_for,
+            extra_reason: self.extra_for,
             voided: DecisionRecord::from_columns(self.voided_at, self.voided_for),
             published_at: self.published_at.map(|at| at.0),
             dataset_removed: DecisionRecord::from_columns(

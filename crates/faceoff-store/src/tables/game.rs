@@ -68,7 +68,7 @@ pub enum GameState {
         since: Timestamp,
     },
     /// The game has a result.
-    Played(Box<GameResultRow>),
+    Played(Box<StoredGameResult>),
     /// Given up after platform faults: it has no result until it is repeated.
     PlatformFailed {
         /// When it was given up.
@@ -101,13 +101,13 @@ impl GameState {
 
 /// The stored result of a game.
 #[derive(Debug, Clone, PartialEq)]
-pub struct GameResultRow {
+pub struct StoredGameResult {
     /// The attempt that counts, from 1.
     pub attempt: u32,
     /// When it was committed.
     pub at: Timestamp,
     /// A game's `results.json`, as computed by the scoring.
-    pub score: Value,
+    pub results: Value,
     /// Its stored files; `None` for a game of a replay.
     pub recording: Option<GameRecording>,
 }
@@ -127,7 +127,7 @@ pub struct GameRecording {
 #[derive(Debug, Clone, PartialEq)]
 pub struct GameCommit {
     /// A game's `results.json`, as computed by the scoring.
-    pub score: Value,
+    pub results: Value,
     /// Files that are stored already; `None` exactly for a game of a replay.
     pub recording: Option<GameRecording>,
     /// The tails of both agents' standard errors, with their faults.

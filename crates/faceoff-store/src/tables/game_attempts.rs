@@ -173,7 +173,7 @@ pub(crate) async fn commit(
                away_blake3 = ?, home_log = ?, away_log = ?
            WHERE game_id = ? AND ended_at IS NULL RETURNING number AS "number!""#,
         Instant(now),
-        Json(&commit.score),
+        Json(&commit.results),
         key,
         game_blake3,
         home_blake3,

@@ -1,7 +1,7 @@
 //! The table of games of tournaments. The types of a game are in [`game`](super::game).
 
 pub use super::game::{
-    Game, GameCommit, GamePurpose, GameRecording, GameResultRow, GameState, ScheduleEntry,
+    Game, GameCommit, GamePurpose, GameRecording, GameState, ScheduleEntry, StoredGameResult,
 };
 use crate::{
     column::{Instant, Json},
@@ -87,10 +87,10 @@ impl GameRow {
                 attempt: self.attempt?,
                 since: self.begun_at?.0,
             },
-            "played" => GameState::Played(Box::new(GameResultRow {
+            "played" => GameState::Played(Box::new(StoredGameResult {
                 attempt: self.attempt?,
                 at: ended_at?,
-                score: self.score.take()?.0,
+                results: self.score.take()?.0,
                 recording,
             })),
             state => {

@@ -40,8 +40,10 @@ pub(crate) struct OpenEvaluation {
     pub(crate) team: TeamId,
     pub(crate) stage_day: StageDay,
     pub(crate) run: RunId,
-    /// Number of episodes in its committed shards, and their slot time in milliseconds.
-    pub(crate) done: (u32, i64),
+    /// Number of episodes in its committed shards.
+    pub(crate) done_episodes: u32,
+    /// Slot time of these episodes, in milliseconds.
+    pub(crate) done_ms: i64,
     /// Number of episodes in its other shards.
     pub(crate) episodes_left: u32,
     /// Number of its other shards.
@@ -78,7 +80,8 @@ pub(crate) async fn open_evaluations(
                 date: row.day.0,
             },
             run: row.run,
-            done: (row.done_episodes, row.done_ms),
+            done_episodes: row.done_episodes,
+            done_ms: row.done_ms,
             episodes_left: row.episodes_left,
             shards_left: row.shards_left,
             max_faults: row.max_faults,
@@ -110,8 +113,11 @@ pub(crate) async fn recent(
     .fetch_all(&mut *connection)
     .await?;
     let running = open_evaluations.iter().map(|evaluation| {
-        let (episodes, ms) = evaluation.done;
-        (evaluation.team, ms, i64::from(episodes))
+        (
+            evaluation.team,
+            evaluation.done_ms,
+            i64::from(evaluation.done_episodes),
+        )
     });
     let finished = rows
         .into_iter()

@@ -26,10 +26,10 @@ pub struct ShardProgress {
 }
 
 impl RunProgress {
-    /// Number of episodes of the shards that were committed before the minute of `now` began. A team sees no more than this, because its
-    /// agent could speak to it by the pace of its episodes.
+    /// Number of episodes of the shards that were committed before the minute of `now` began. Teams see no more than this: an agent could
+    /// otherwise signal to its team by the timing of its episodes.
     #[must_use]
-    pub fn in_whole_shards(&self, now: Timestamp) -> u32 {
+    pub fn episodes_visible_to_team(&self, now: Timestamp) -> u32 {
         let minute = TimestampRound::new()
             .smallest(Unit::Minute)
             .mode(jiff::RoundMode::Floor);
@@ -101,7 +101,11 @@ mod tests {
             ("2026-03-01T12:01:59.999Z", 50),
             ("2026-03-01T12:02:00Z", 90),
         ] {
-            assert_eq!(progress.in_whole_shards(at(now)), expected, "{now}");
+            assert_eq!(
+                progress.episodes_visible_to_team(at(now)),
+                expected,
+                "{now}"
+            );
         }
     }
 }

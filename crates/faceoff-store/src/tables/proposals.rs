@@ -43,7 +43,7 @@ impl ProposalKind {
     pub const fn day(self) -> Option<Date> {
         match self {
             Self::Trial => None,
-            Self::Evaluation(day) | Self::Day(day) | Self::Rules(day) => Some(day),
+            Self::Evaluation(day) | Self::Day(day) | Self::DayWithNewestRules(day) => Some(day),
         }
     }
 
@@ -52,7 +52,7 @@ impl ProposalKind {
             Self::Trial => "trial",
             Self::Evaluation(_) => "evaluation",
             Self::Day(_) => "day",
-            Self::Rules(_) => "rules",
+            Self::DayWithNewestRules(_) => "rules",
         }
     }
 
@@ -61,7 +61,7 @@ impl ProposalKind {
             ("trial", None) => Self::Trial,
             ("evaluation", Some(day)) => Self::Evaluation(day),
             ("day", Some(day)) => Self::Day(day),
-            ("rules", Some(day)) => Self::Rules(day),
+            ("rules", Some(day)) => Self::DayWithNewestRules(day),
             _ => return None,
         })
     }

@@ -10,7 +10,7 @@ use sqlx::SqliteConnection;
 
 /// The organisers' answer to a question.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Reply {
+pub struct QuestionAnswer {
     /// When it was given.
     pub at: Timestamp,
     pub text: String,
@@ -27,7 +27,7 @@ pub struct Question {
     /// When it was asked.
     pub at: Timestamp,
     pub text: String,
-    pub answer: Option<Reply>,
+    pub answer: Option<QuestionAnswer>,
 }
 
 struct QuestionRow {
@@ -49,7 +49,7 @@ impl From<QuestionRow> for Question {
             team: row.team_id,
             at: row.asked_at.0,
             text: row.text,
-            answer: answer.map(|(text, at)| Reply {
+            answer: answer.map(|(text, at)| QuestionAnswer {
                 at: at.0,
                 text,
                 is_public,
@@ -102,7 +102,7 @@ pub(crate) async fn insert(connection: &mut SqliteConnection, question: &Questio
 pub(crate) async fn set_answer(
     connection: &mut SqliteConnection,
     id: QuestionId,
-    answer: &Reply,
+    answer: &QuestionAnswer,
 ) -> Result<()> {
     sqlx::query!(
         "UPDATE questions SET answer = ?, answered_at = ?, public = ? WHERE id = ?",

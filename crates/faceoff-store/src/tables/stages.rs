@@ -30,8 +30,8 @@ pub struct Stage {
     pub settings: StageSettings,
     /// Everything that scores depend on: the current revision.
     pub rules: Revision,
-    /// Do the seeds of its days derive from its id? False if they began before there were stages.
-    pub names_seeds: bool,
+    /// False if its days began before there were stages; their seeds then derive from the date alone.
+    pub seeds_derive_from_id: bool,
     /// Does it take its rules and settings from the server's configuration file?
     pub configured: bool,
     /// Set once the stage is signed off, so that it cannot be changed.
@@ -143,7 +143,7 @@ impl Stage {
     /// Label from which the seeds of the stage's evaluations on a date derive.
     #[must_use]
     pub const fn seed_label(&self, date: Date) -> SeedLabel {
-        if self.names_seeds {
+        if self.seeds_derive_from_id {
             SeedLabel::StageDay(StageDay {
                 stage: self.id,
                 date,
@@ -185,7 +185,7 @@ impl From<StageRow> for Stage {
                 since: row.since.0,
                 rules: row.rules.0,
             },
-            names_seeds: row.names_seeds,
+            seeds_derive_from_id: row.names_seeds,
             configured: row.configured,
             sign_off: SignOff::from_columns(
                 row.finalised_at,
@@ -273,7 +273,7 @@ pub(crate) async fn insert(
         stage.closes_at.map(Instant),
         &stage.zone,
         Json(&stage.settings),
-        stage.names_seeds,
+        stage.seeds_derive_from_id,
         stage.configured,
         Instant(now),
     )
@@ -380,7 +380,7 @@ mod tests {
                     limits: Default::default(),
                 },
             },
-            names_seeds: true,
+            seeds_derive_from_id: true,
             configured: false,
             sign_off: None,
         }

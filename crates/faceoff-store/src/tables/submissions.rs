@@ -68,7 +68,7 @@ pub enum SubmissionState {
 impl SubmissionState {
     /// Has the validation run ended?
     #[must_use]
-    pub const fn is_checked(&self) -> bool {
+    pub const fn validation_is_over(&self) -> bool {
         !matches!(self, Self::Validating)
     }
 }

@@ -20,7 +20,7 @@ pub struct Team {
     /// Set while the team is disqualified: it is neither evaluated nor ranked.
     pub disqualified: Option<DecisionRecord>,
     pub profile: TeamProfile,
-    /// When the team withdrew from the season; its results stay.
+    /// When the team retired from the season; its results stay.
     pub retired_at: Option<Timestamp>,
     /// A reference agent of the organisers: it is evaluated as others are, and not ranked.
     pub is_baseline: bool,

@@ -155,9 +155,9 @@ macro_rules! select_tokens {
     };
 }
 
-/// Whose tokens and sessions a list has.
+/// The owners whose tokens and sessions a list has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TokensOf {
+pub enum TokenFilter {
     Everyone,
     /// Those of a user.
     User(UserId),
@@ -165,7 +165,7 @@ pub enum TokensOf {
     Member(UserId, TeamId),
 }
 
-impl TokensOf {
+impl TokenFilter {
     /// Is the token in the list?
     #[must_use]
     pub fn includes(self, token: &Token) -> bool {
@@ -181,14 +181,14 @@ impl TokensOf {
 /// At most `limit` API tokens and sessions, the newest first; only those that come after the token `after` in this order.
 pub(crate) async fn list(
     connection: &mut SqliteConnection,
-    of: TokensOf,
+    of: TokenFilter,
     after: Option<&Token>,
     limit: u32,
 ) -> Result<Vec<Token>> {
     let created_at = Instant(after.map_or(Timestamp::MAX, |token| token.created_at));
     let id = after.map(|token| token.id);
     let rows = match of {
-        TokensOf::Everyone => {
+        TokenFilter::Everyone => {
             select_tokens!(
                 "WHERE (created_at, id) < (?, ?) ORDER BY created_at DESC, id DESC LIMIT ?",
                 created_at,
@@ -198,7 +198,7 @@ pub(crate) async fn list(
             .fetch_all(connection)
             .await?
         }
-        TokensOf::User(user) | TokensOf::Member(user, _) => {
+        TokenFilter::User(user) | TokenFilter::Member(user, _) => {
             let mut rows = select_tokens!(
                 "WHERE person_id = ? AND (created_at, id) < (?, ?) ORDER BY created_at DESC, id DESC LIMIT ?",
                 user,
@@ -208,7 +208,7 @@ pub(crate) async fn list(
             )
             .fetch_all(&mut *connection)
             .await?;
-            if let TokensOf::Member(_, team) = of {
+            if let TokenFilter::Member(_, team) = of {
                 let rows_of_team = select_tokens!(
                     "WHERE team_id = ? AND (created_at, id) < (?, ?) ORDER BY created_at DESC, id DESC LIMIT ?",
                     team,
@@ -237,12 +237,12 @@ pub(crate) async fn of_operator(connection: &mut SqliteConnection) -> Result<Vec
 /// The tokens and sessions that are valid at `now`, the newest first.
 pub(crate) async fn valid(
     connection: &mut SqliteConnection,
-    of: TokensOf,
+    of: TokenFilter,
     now: Timestamp,
 ) -> Result<Vec<Token>> {
     let now = Instant(now);
     let mut rows = match of {
-        TokensOf::Everyone => {
+        TokenFilter::Everyone => {
             select_tokens!(
                 "WHERE revoked_at IS NULL AND (expires_at IS NULL OR expires_at > ?)",
                 now
@@ -250,7 +250,7 @@ pub(crate) async fn valid(
             .fetch_all(connection)
             .await?
         }
-        TokensOf::User(user) | TokensOf::Member(user, _) => {
+        TokenFilter::User(user) | TokenFilter::Member(user, _) => {
             let mut rows = select_tokens!(
                 "WHERE owner = 'person' AND team_id IS NULL AND person_id = ? AND revoked_at IS NULL
                  AND (expires_at IS NULL OR expires_at > ?)",
@@ -259,7 +259,7 @@ pub(crate) async fn valid(
             )
             .fetch_all(&mut *connection)
             .await?;
-            if let TokensOf::Member(_, team) = of {
+            if let TokenFilter::Member(_, team) = of {
                 let rows_of_team = select_tokens!(
                     "WHERE owner = 'team' AND team_id = ? AND revoked_at IS NULL AND (expires_at IS NULL OR expires_at > ?)",
                     team,
@@ -274,9 +274,9 @@ pub(crate) async fn valid(
     Ok(rows.into_iter().map(Token::from).collect())
 }
 
-/// Deletes at most `limit` tokens and sessions that ended at `ended_before` or earlier. What was made with them counts as made with
-/// what they were made with, so that it still ends with that. Tokens of the operator stay: a revoked one in the file of a restored data
-/// folder must be recognised. Returns the number of tokens.
+/// Deletes at most `limit` tokens and sessions that ended at `ended_before` or earlier. Credentials that were created with a
+/// deleted token are attributed to the token that created it, so that they still end with that one. Tokens of the operator stay: a revoked
+/// one in the file of a restored data folder must be recognised. Returns the number of tokens.
 pub(crate) async fn forget_ended(
     connection: &mut SqliteConnection,
     ended_before: Timestamp,

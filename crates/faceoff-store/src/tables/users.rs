@@ -163,7 +163,7 @@ pub(crate) async fn set_name(
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,
     user: &User,
-    password: Option<&str>,
+    password_hash: Option<&str>,
 ) -> Result<()> {
     check_name_is_free(&mut *connection, user.id, &user.name).await?;
     sqlx::query!(
@@ -172,7 +172,7 @@ pub(crate) async fn insert(
         user.name.as_str(),
         user.team,
         Instant(user.joined_at),
-        password,
+        password_hash,
         user.accepted_terms,
     )
     .execute(connection)
@@ -181,27 +181,31 @@ pub(crate) async fn insert(
 }
 
 /// The hash of an active user's password, if there is one.
-pub(crate) async fn password_of(
+pub(crate) async fn password_hash_of(
     connection: &mut SqliteConnection,
     id: UserId,
 ) -> Result<Option<String>> {
-    let password = sqlx::query_scalar!(
+    let hash = sqlx::query_scalar!(
         "SELECT password FROM people WHERE id = ? AND left_at IS NULL",
         id
     )
     .fetch_optional(connection)
     .await?;
-    Ok(password.flatten())
+    Ok(hash.flatten())
 }
 
 pub(crate) async fn set_password(
     connection: &mut SqliteConnection,
     id: UserId,
-    password: &str,
+    password_hash: &str,
 ) -> Result<()> {
-    sqlx::query!("UPDATE people SET password = ? WHERE id = ?", password, id)
-        .execute(connection)
-        .await?;
+    sqlx::query!(
+        "UPDATE people SET password = ? WHERE id = ?",
+        password_hash,
+        id
+    )
+    .execute(connection)
+    .await?;
     Ok(())
 }
 

@@ -175,10 +175,10 @@ async fn ablation_failure_records_agent_or_platform_fault() {
     // Another ablation can be requested. After a platform fault its shard is retried; after the last attempt the ablation fails.
     f.advance_clock_s(1);
     f.request_ablation(submission.id).await;
-    for _ in 0..MAX_ATTEMPTS {
+    for _ in 0..MAX_PLATFORM_FAULTS {
         let (claim, ..) = f.claim_ablation_shard().await;
         f.store
-            .release_failed(&claim, "the disk is full", f.now)
+            .release_after_platform_fault(&claim, "the disk is full", f.now)
             .await
             .unwrap();
         // After this delay the shard can be claimed again.

@@ -320,7 +320,7 @@ async fn public_archive_has_results_without_episodes() {
 }
 
 #[tokio::test]
-async fn public_archive_omits_lifted_rulings_and_private_answers() {
+async fn public_archive_omits_reinstatements_and_private_answers() {
     let f = TestStore::new().await;
     let [alpha, beta] = f.two_valid_submissions().await;
     f.evaluate(alpha.id, &one_shard_plan()).await;
@@ -570,7 +570,7 @@ async fn import_removes_planted_credentials() {
     exec(&database(&folder), planted).await;
     Store::import(folder.path(), f.now).await.unwrap();
     let imported = Store::open(folder.path()).await.unwrap();
-    let tokens = imported.tokens_after(TokensOf::Everyone, None, 10).await;
+    let tokens = imported.tokens_after(TokenFilter::Everyone, None, 10).await;
     assert!(tokens.unwrap().unwrap().is_empty());
     let verified = imported
         .verify_token([0; 32], TokenKind::ApiToken, f.now)
@@ -691,7 +691,7 @@ async fn run_game(f: &TestStore) {
     };
     let hash = || "0".repeat(64);
     let commit = GameCommit {
-        score: serde_json::json!({}),
+        results: serde_json::json!({}),
         recording: Some(GameRecording {
             key: format!("games/{}", claim.nonce),
             game_blake3: hash(),

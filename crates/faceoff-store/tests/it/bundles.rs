@@ -64,10 +64,10 @@ async fn commit_invalid_with_log(f: &TestStore, log: &str) {
 
 /// Ends the next validation run by platform faults.
 async fn fail_validation(f: &mut TestStore) {
-    for _ in 0..MAX_ATTEMPTS {
+    for _ in 0..MAX_PLATFORM_FAULTS {
         let (claim, _) = f.claim_validation().await;
         f.store
-            .release_failed(&claim, "no disk", f.now)
+            .release_after_platform_fault(&claim, "no disk", f.now)
             .await
             .unwrap();
         f.advance_clock_s(3600);
@@ -81,14 +81,14 @@ async fn invalid_bundle_is_deleted_but_reason_and_log_stay() {
     let valid = upload_stored(&f, &team, "valid", 100).await;
     f.validate().await;
     let invalid = upload_stored(&f, &team, "invalid", 1000).await;
-    assert_eq!(f.store.remove_refused_bundles(f.now).await.unwrap(), 0);
+    assert_eq!(f.store.remove_failed_bundles(f.now).await.unwrap(), 0);
     commit_invalid(&f).await;
     let waiting = upload_stored(&f, &team, "waiting", 10).await;
     let usage = f.store.upload_usage(team.id, f.now).await.unwrap();
     assert_eq!((usage.day_bytes, usage.stored_bytes), (1110, 1110));
 
-    assert_eq!(f.store.remove_refused_bundles(f.now).await.unwrap(), 1);
-    assert_eq!(f.store.remove_refused_bundles(f.now).await.unwrap(), 0);
+    assert_eq!(f.store.remove_failed_bundles(f.now).await.unwrap(), 1);
+    assert_eq!(f.store.remove_failed_bundles(f.now).await.unwrap(), 0);
     assert!(!is_kept(&f, &invalid).await);
     assert!(is_kept(&f, &valid).await && is_kept(&f, &waiting).await);
     let stored = f.store.submission(invalid.id).await.unwrap();
@@ -118,7 +118,7 @@ async fn identical_invalid_bundles_share_the_newest_log() {
         uploaded.push(upload_with_content(&f, team, name, 10, content).await.id);
         commit_invalid_with_log(&f, log).await;
     }
-    f.store.remove_refused_bundles(f.now).await.unwrap();
+    f.store.remove_failed_bundles(f.now).await.unwrap();
     let shared = "log of the second\n";
     for (id, expected) in
         uploaded
@@ -140,12 +140,12 @@ async fn logs_of_the_last_invalid_submissions_are_kept() {
     let of_beta = upload_stored(&f, &beta, "beta", 10).await;
     commit_invalid(&f).await;
     let mut uploaded = Vec::new();
-    for number in 0..REFUSED_LOGS_KEPT + 2 {
+    for number in 0..INVALID_LOGS_KEPT + 2 {
         f.advance_clock_s(1);
         uploaded.push(upload_stored(&f, &alpha, &format!("bundle-{number}"), 10).await);
         commit_invalid(&f).await;
     }
-    f.store.remove_refused_bundles(f.now).await.unwrap();
+    f.store.remove_failed_bundles(f.now).await.unwrap();
     let has_log = async |id| f.store.submission_log(id).await.unwrap().unwrap() != "";
     assert!(!has_log(uploaded[0].id).await && !has_log(uploaded[1].id).await);
     for submission in &uploaded[2..] {
@@ -155,21 +155,21 @@ async fn logs_of_the_last_invalid_submissions_are_kept() {
 }
 
 #[tokio::test]
-async fn unchecked_bundle_is_kept_a_day_outside_the_quota() {
+async fn bundle_after_platform_fault_is_kept_a_day_outside_quota() {
     let mut f = TestStore::new().await;
     let team = f.create_team("Alpha").await;
-    let unchecked = upload_stored(&f, &team, "unchecked", 1000).await;
+    let failed = upload_stored(&f, &team, "failed", 1000).await;
     let uploaded_at = f.now;
     fail_validation(&mut f).await;
     let usage = f.store.upload_usage(team.id, f.now).await.unwrap();
     assert_eq!((usage.day_bytes, usage.stored_bytes), (0, 1000));
-    assert_eq!(f.store.remove_refused_bundles(f.now).await.unwrap(), 0);
-    let removable_at = uploaded_at + UNCHECKED_KEPT_FOR;
+    assert_eq!(f.store.remove_failed_bundles(f.now).await.unwrap(), 0);
+    let removable_at = uploaded_at + PLATFORM_FAILED_BUNDLES_KEPT_FOR;
     assert_eq!(
-        f.store.remove_refused_bundles(removable_at).await.unwrap(),
+        f.store.remove_failed_bundles(removable_at).await.unwrap(),
         1
     );
-    assert!(!is_kept(&f, &unchecked).await);
+    assert!(!is_kept(&f, &failed).await);
 }
 
 #[tokio::test]
@@ -181,7 +181,7 @@ async fn shared_bundle_is_not_deleted() {
     f.validate().await;
     upload_stored(&f, &team, "shared", 100).await;
     commit_invalid(&f).await;
-    assert_eq!(f.store.remove_refused_bundles(f.now).await.unwrap(), 0);
+    assert_eq!(f.store.remove_failed_bundles(f.now).await.unwrap(), 0);
     assert!(is_kept(&f, &valid).await);
 }
 

@@ -30,7 +30,7 @@ async fn accepted_step_ends_no_lease_and_delays_no_job() {
         let (running, ..) = f.claim_shard().await;
         let (failed, ..) = f.claim_shard().await;
         f.store
-            .release_failed(&failed, "a fault", f.now)
+            .release_after_platform_fault(&failed, "a fault", f.now)
             .await
             .unwrap();
         set_clock(&mut f, by_s).await;

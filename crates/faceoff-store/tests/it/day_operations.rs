@@ -190,7 +190,7 @@ async fn extra_evaluation_of_open_day_uses_its_episodes() {
     f.upload(&late).await;
     f.validate().await;
     let extra_evaluation = add_extra(&f, day.stage_day, late.id, false).await.unwrap();
-    assert_eq!(extra_evaluation.extra_for.as_deref(), Some(REASON));
+    assert_eq!(extra_evaluation.extra_reason.as_deref(), Some(REASON));
     assert_conflict(
         add_extra(&f, day.stage_day, late.id, false).await,
         &["queued or running"],
@@ -212,7 +212,10 @@ async fn extra_evaluation_of_open_day_uses_its_episodes() {
     assert_eq!(labels, [SeedLabel::StageDay(day.stage_day); 2]);
     assert!(f.store.days().await.unwrap()[0].0.released_at.is_some());
     let board = f.board().await;
-    let reasons: Vec<_> = board.iter().map(|row| row.extra_for.as_deref()).collect();
+    let reasons: Vec<_> = board
+        .iter()
+        .map(|row| row.extra_reason.as_deref())
+        .collect();
     assert_eq!(reasons, [None, Some(REASON)]);
 }
 
@@ -251,14 +254,14 @@ async fn extra_evaluation_of_released_day_gets_new_episodes() {
         .store
         .rerun_evaluation(Actor::Operator, extra_evaluation.id, f.now);
     let rerun = rerun.await.unwrap();
-    assert_eq!(rerun.extra_for.as_deref(), Some(REASON));
+    assert_eq!(rerun.extra_reason.as_deref(), Some(REASON));
     let (claim, run, shard) = f.claim_shard().await;
     assert_eq!(run.seed, SeedLabel::Extra(extra_evaluation.id));
     f.commit_shard(&claim, &shard).await;
     f.run_all_with_score(3.0).await;
     let board = f.board().await;
     assert_eq!(
-        (board[0].result.score, board[0].extra_for.as_deref()),
+        (board[0].result.score, board[0].extra_reason.as_deref()),
         (3.0, Some(REASON))
     );
     assert_eq!(

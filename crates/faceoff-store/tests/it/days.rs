@@ -88,7 +88,7 @@ async fn concurrent_day_starts_make_one_cutoff() {
 }
 
 #[tokio::test]
-async fn empty_day_keeps_its_cutoff_unless_scheduled() {
+async fn day_without_submissions_starts_only_by_schedule() {
     let mut f = TestStore::new().await;
     let team = f.create_team("Alpha").await;
     let refused = f.start_day(&six_shard_plan()).await;

@@ -26,7 +26,7 @@ async fn events_record_each_step_of_a_submission() {
     f.commit_shard(&claim, &shard).await;
     let (claim, ..) = f.claim_shard().await;
     f.store
-        .release_failed(&claim, "disk full", f.now)
+        .release_after_platform_fault(&claim, "disk full", f.now)
         .await
         .unwrap();
     f.store
@@ -83,7 +83,7 @@ async fn events_record_each_step_of_a_submission() {
     );
     assert_eq!(
         records[9].event,
-        Event::JobReturned {
+        Event::JobFailed {
             job: claim.job,
             failures: 1,
             reason: "disk full".into(),
@@ -134,9 +134,11 @@ async fn events_record_each_end_of_an_evaluation() {
             }
             End::PlatformFailed => {
                 f.store.release(&claim, f.now).await.unwrap();
-                for _ in 0..MAX_ATTEMPTS {
+                for _ in 0..MAX_PLATFORM_FAULTS {
                     let (claim, ..) = f.claim_shard().await;
-                    let released = f.store.release_failed(&claim, "no disk", f.now);
+                    let released = f
+                        .store
+                        .release_after_platform_fault(&claim, "no disk", f.now);
                     released.await.unwrap();
                     f.advance_clock_s(60);
                 }

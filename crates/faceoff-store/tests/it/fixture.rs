@@ -197,7 +197,7 @@ impl TestStore {
     /// Reports platform faults until an evaluation with one shard has ended. Returns its id.
     pub async fn fail_next_evaluation(&mut self) -> EvaluationId {
         let mut failing = None;
-        for _ in 0..MAX_ATTEMPTS {
+        for _ in 0..MAX_PLATFORM_FAULTS {
             let Some(ClaimedJob { claim, job }) = self.claim().await else {
                 panic!("a job is queued")
             };
@@ -209,7 +209,9 @@ impl TestStore {
                 panic!("expected a shard of an evaluation, claimed {job:?}")
             };
             assert_eq!(*failing.get_or_insert(id), id);
-            let released = self.store.release_failed(&claim, "disk full", self.now);
+            let released = self
+                .store
+                .release_after_platform_fault(&claim, "disk full", self.now);
             released.await.unwrap();
             if !self.state(id).await.is_over() {
                 // Past the delay before the next attempt.
@@ -379,7 +381,7 @@ pub fn join_request(code_hash: [u8; 32], name: &str) -> JoinRequest {
     JoinRequest {
         code_hash,
         name: Some(name.parse().unwrap()),
-        password: None,
+        password_hash: None,
         team: None,
         accepted_terms: None,
         token_hash: *blake3::hash(&code_hash).as_bytes(),

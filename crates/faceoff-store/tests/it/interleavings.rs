@@ -91,7 +91,7 @@ async fn run_actions(actions: Vec<Action>) {
             Action::Fail(number) => {
                 if let Some(ClaimedJob { claim, .. }) = history.select(number) {
                     f.store
-                        .release_failed(claim, "a platform fault", f.now)
+                        .release_after_platform_fault(claim, "a platform fault", f.now)
                         .await
                         .unwrap();
                 }

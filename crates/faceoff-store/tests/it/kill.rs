@@ -159,7 +159,7 @@ async fn child_process_writes_until_killed() {
                         apply_finished_proposals(&store, now, &report).await;
                         continue;
                     };
-                    if scored.extra_for.is_some() {
+                    if scored.extra_reason.is_some() {
                         continue;
                     }
                     if scored.rerun_of.is_some() {

@@ -619,7 +619,7 @@ async fn migration_creates_first_stage_with_revisions() {
     let stage = store.stages().await.unwrap().remove(0);
     assert_eq!(stage.name.as_str(), "Qualifying");
     assert!(
-        !stage.names_seeds,
+        !stage.seeds_derive_from_id,
         "the seeds of its days derive from the dates alone, as before there were stages"
     );
     assert!(
@@ -743,7 +743,7 @@ async fn migration_keeps_leases_and_failure_counts() {
         ..claim
     };
     // The third shard has two failures, too.
-    let failures_left = MAX_ATTEMPTS - 2;
+    let failures_left = MAX_PLATFORM_FAULTS - 2;
     for failure in 1..=failures_left {
         let shard_claim = if failure == 1 {
             claim.clone()
@@ -756,7 +756,7 @@ async fn migration_keeps_leases_and_failure_counts() {
             }
         };
         f.store
-            .release_failed(&shard_claim, "no disk", f.now)
+            .release_after_platform_fault(&shard_claim, "no disk", f.now)
             .await
             .unwrap();
         f.advance_clock_s(60);

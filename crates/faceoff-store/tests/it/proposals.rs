@@ -279,9 +279,11 @@ async fn reevaluation_replaces_result_by_agent_failure() {
     let proposed = propose_reevaluation(&f, Reevaluation::Evaluation(beta_evaluation))
         .await
         .unwrap();
-    for _ in 0..MAX_ATTEMPTS {
+    for _ in 0..MAX_PLATFORM_FAULTS {
         let claimed = f.claim().await.unwrap();
-        let failed = f.store.release_failed(&claimed.claim, "disk full", f.now);
+        let failed = f
+            .store
+            .release_after_platform_fault(&claimed.claim, "disk full", f.now);
         failed.await.unwrap();
         f.advance_clock_s(60);
     }
@@ -303,7 +305,7 @@ async fn reevaluation_by_new_rules_has_its_own_board() {
     let f = TestStore::new().await;
     let (_, stage_day) = f.released_day().await;
     assert_conflict(
-        propose_reevaluation(&f, Reevaluation::Rules(stage_day)).await,
+        propose_reevaluation(&f, Reevaluation::DayWithNewestRules(stage_day)).await,
         &["stage's newest rules"],
     );
     let new_plan = RunPlan {
@@ -311,7 +313,7 @@ async fn reevaluation_by_new_rules_has_its_own_board() {
         ..one_shard_plan()
     };
     let stage = f.configure_stage(&new_plan).await;
-    let proposed = propose_reevaluation(&f, Reevaluation::Rules(stage_day))
+    let proposed = propose_reevaluation(&f, Reevaluation::DayWithNewestRules(stage_day))
         .await
         .unwrap();
     assert_eq!(proposed.revision, 2);
@@ -334,7 +336,7 @@ async fn reevaluation_by_new_rules_has_its_own_board() {
     );
     assert_eq!(scores(2).await, [5.0, 5.0]);
     assert_conflict(
-        propose_reevaluation(&f, Reevaluation::Rules(stage_day)).await,
+        propose_reevaluation(&f, Reevaluation::DayWithNewestRules(stage_day)).await,
         &["stage's newest rules"],
     );
 }

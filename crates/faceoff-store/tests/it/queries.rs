@@ -111,7 +111,7 @@ const OF_ALL_EVALUATIONS: [(&str, &str); 4] = [
 ];
 
 #[test]
-fn other_queries_read_evaluations_that_count() {
+fn queries_without_exemption_read_counting_evaluations() {
     let mut whole_table = 0;
     for (_, data) in query_data() {
         let sql = data["query"].as_str().unwrap();

@@ -70,7 +70,7 @@ async fn expired_lease_is_reassigned_and_old_holder_refused() {
     );
     f.store.release(&first, f.now).await.unwrap();
     f.store
-        .release_failed(&first, "too late", f.now)
+        .release_after_platform_fault(&first, "too late", f.now)
         .await
         .unwrap();
     assert!(
@@ -277,7 +277,7 @@ async fn outcomes_must_cover_their_shard() {
 }
 
 #[tokio::test]
-async fn scoring_and_validation_precede_shards() {
+async fn queued_scoring_and_validation_run_before_next_shard() {
     let f = TestStore::new().await;
     let [alpha, beta] = f.two_valid_submissions().await;
     let one_shard = one_shard_plan();
@@ -316,7 +316,7 @@ async fn platform_faults_pause_shard_then_rerun_evaluation() {
     let evaluation = f.start_evaluation(&six_shard_plan()).await;
     let (first_claim, _, shard) = f.claim_shard().await;
     f.store
-        .release_failed(&first_claim, "disk full", f.now)
+        .release_after_platform_fault(&first_claim, "disk full", f.now)
         .await
         .unwrap();
     // The claims of the other five of the six shards.
@@ -327,7 +327,7 @@ async fn platform_faults_pause_shard_then_rerun_evaluation() {
         open.push(claim);
     }
     assert!(f.claim().await.is_none());
-    for failure in 2..=MAX_ATTEMPTS {
+    for failure in 2..=MAX_PLATFORM_FAULTS {
         f.advance_clock_s(60);
         for claim in &open {
             assert!(f.store.heartbeat(claim, 0, 1000, f.now).await.unwrap());
@@ -339,7 +339,7 @@ async fn platform_faults_pause_shard_then_rerun_evaluation() {
             "before failure {failure}"
         );
         f.store
-            .release_failed(&claim, "disk full", f.now)
+            .release_after_platform_fault(&claim, "disk full", f.now)
             .await
             .unwrap();
     }
@@ -372,10 +372,10 @@ async fn failed_scoring_reruns_the_evaluation() {
     let evaluation = f.evaluate(submission.id, &one_shard).await;
     let (claim, _, shard) = f.claim_shard().await;
     f.commit_shard(&claim, &shard).await;
-    for _ in 0..MAX_ATTEMPTS {
+    for _ in 0..MAX_PLATFORM_FAULTS {
         let (claim, _) = f.claim_scoring().await;
         f.store
-            .release_failed(&claim, "no space left", f.now)
+            .release_after_platform_fault(&claim, "no space left", f.now)
             .await
             .unwrap();
         assert_eq!(
@@ -397,11 +397,11 @@ async fn failed_validation_run_ends_as_platform_fault() {
     let mut f = TestStore::new().await;
     let team = f.create_team("Alpha").await;
     let submission = f.upload(&team).await;
-    for _ in 0..MAX_ATTEMPTS {
+    for _ in 0..MAX_PLATFORM_FAULTS {
         let (claim, submission) = f.claim_validation().await;
         assert_eq!(submission.state, SubmissionState::Validating);
         f.store
-            .release_failed(&claim, "no cgroup", f.now)
+            .release_after_platform_fault(&claim, "no cgroup", f.now)
             .await
             .unwrap();
         f.advance_clock_s(60);

@@ -31,7 +31,10 @@ async fn platform_faults_count_as_retries_and_shutdowns_do_not() {
     let (claim, retries) = claim_shard_and_retries(&f).await;
     assert_eq!(retries, 0, "a shutdown is no fault");
 
-    let failed = f.store.release_failed(&claim, "disk full", f.now).await;
+    let failed = f
+        .store
+        .release_after_platform_fault(&claim, "disk full", f.now)
+        .await;
     failed.unwrap();
     f.advance_clock_s(3600);
     let (_, retries) = claim_shard_and_retries(&f).await;

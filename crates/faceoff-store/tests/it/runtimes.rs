@@ -8,7 +8,7 @@ use faceoff_testkit::accept_runtimes;
 async fn excluded_submissions(f: &TestStore) -> Vec<Subject> {
     let events = f.store.events_after(0, 1000).await.unwrap();
     let exclusions = events.into_iter().filter(|record| {
-        matches!(&record.event, Event::SubmissionNotTaken { reason, .. } if reason.contains("“Qualifying”"))
+        matches!(&record.event, Event::SubmissionExcluded { reason, .. } if reason.contains("“Qualifying”"))
     });
     exclusions.map(|record| record.subject).collect()
 }

@@ -1,4 +1,4 @@
-//! The end of a stage: blind stages (teams see no results until organisers open the stage), the final day after the closing,
+//! The end of a stage: blind stages (teams see no results until organisers reveal the stage), the final day after the closing,
 //! publication of evaluations, and the sign-off, which makes the results final.
 
 use crate::fixture::*;
@@ -33,7 +33,8 @@ fn blind_settings() -> StageSettings {
     }
 }
 
-fn settings_with(counting_result: CountingResult) -> StageSettings {
+/// `counting_result` chooses the result of a team that counts for its rank.
+fn settings_with_counting_result(counting_result: CountingResult) -> StageSettings {
     StageSettings {
         counting_result,
         ..StageSettings::default()
@@ -66,11 +67,11 @@ async fn all_events(f: &TestStore) -> Vec<Event> {
 }
 
 #[tokio::test]
-async fn blind_stage_is_opened_once() {
+async fn blind_stage_is_revealed_once() {
     let mut f = TestStore::new().await;
     f.valid_submission_of("Alpha").await;
     let stage = create_stage(&f, blind_settings()).await;
-    // Before the first score a stage can be made blind, and opened, any number of times.
+    // Before the first score a stage can be made blind, and revealed, any number of times.
     change_settings(&f, &stage, |settings| settings.blind = false)
         .await
         .unwrap();
@@ -95,12 +96,12 @@ async fn blind_stage_is_opened_once() {
     });
     assert_conflict(
         with_other_change.await,
-        &["closed at", "except to open a blind one"],
+        &["closed at", "except to reveal a blind one"],
     );
-    let opened = change_settings(&f, &stage, |settings| settings.blind = false)
+    let revealed = change_settings(&f, &stage, |settings| settings.blind = false)
         .await
         .unwrap();
-    assert!(!opened.settings.blind);
+    assert!(!revealed.settings.blind);
     let repeated = change_settings(&f, &stage, |settings| settings.blind = true).await;
     assert_conflict(repeated, &["closed at"]);
     f.store.close_season(Actor::Operator, f.now).await.unwrap();
@@ -231,7 +232,7 @@ async fn signed_off_stage_cannot_be_changed() {
 async fn final_day_runs_once_between_close_and_sign_off() {
     let mut f = TestStore::new().await;
     f.valid_submission_of("Alpha").await;
-    let stage = create_stage(&f, settings_with(CountingResult::Final)).await;
+    let stage = create_stage(&f, settings_with_counting_result(CountingResult::Final)).await;
     start_day(&f, &stage).await;
     f.run_all_with_score(10.0).await;
     let start_final_day = async |now| {
@@ -296,7 +297,8 @@ async fn final_day_runs_once_between_close_and_sign_off() {
 #[tokio::test]
 async fn final_day_needs_its_own_date_and_a_submission() {
     let mut f = TestStore::new().await;
-    let without_final_day = create_stage(&f, settings_with(CountingResult::Best)).await;
+    let without_final_day =
+        create_stage(&f, settings_with_counting_result(CountingResult::Best)).await;
     let started = f
         .store
         .start_final_day(Actor::Operator, without_final_day.id, f.now);
@@ -354,8 +356,8 @@ async fn evaluation_is_publishable_once_released_and_not_blind() {
     assert_eq!(f.finish_next_evaluation().await, id);
     assert_conflict(publish(&f, id).await, &["blind"]);
     // The stage is not blind any more, but the day is not released.
-    let opened = change_settings(&f, &stage, |settings| settings.blind = false).await;
-    opened.unwrap();
+    let revealed = change_settings(&f, &stage, |settings| settings.blind = false).await;
+    revealed.unwrap();
     assert_conflict(publish(&f, id).await, &["same episodes"]);
     f.run_all_with_score(1.0).await;
     let published = publish(&f, id).await.unwrap();

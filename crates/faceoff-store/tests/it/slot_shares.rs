@@ -469,7 +469,7 @@ async fn slot_time_lost_by_the_platform_is_not_charged() {
     let (first_team, _) = s.team_and_kind(&first.job).await;
     s.f.advance_clock_s(500);
     s.f.store
-        .release_failed(&first.claim, "disk full", s.f.now)
+        .release_after_platform_fault(&first.claim, "disk full", s.f.now)
         .await
         .unwrap();
     for ending in ["shutdown", "killed worker", "expired lease"] {

@@ -262,7 +262,7 @@ async fn first_stage_follows_configuration_until_changed() {
     };
     let first = configure(&f, &six_shard_plan()).await;
     assert_eq!(first.len(), 1);
-    assert!(first[0].configured && first[0].names_seeds);
+    assert!(first[0].configured && first[0].seeds_derive_from_id);
     assert_eq!(first[0].plan(), six_shard_plan());
     f.advance_clock_s(60);
     assert_eq!(

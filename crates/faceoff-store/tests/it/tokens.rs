@@ -19,7 +19,7 @@ fn new_token(hash: u8, owner: TokenOwner, expires_at: Option<Timestamp>) -> NewT
 
 /// All tokens and sessions, the newest first.
 pub async fn all_tokens(f: &TestStore) -> Vec<Token> {
-    let listed = f.store.tokens_after(TokensOf::Everyone, None, u32::MAX);
+    let listed = f.store.tokens_after(TokenFilter::Everyone, None, u32::MAX);
     listed.await.unwrap().unwrap()
 }
 
@@ -99,7 +99,7 @@ async fn token_is_valid_until_expired_rotated_or_revoked() {
             .revoke_token(
                 Actor::Operator,
                 unlimited.id,
-                CreatedCredentials::Keep,
+                RevocationExtent::TokenOnly,
                 f.now,
             )
             .await;
@@ -111,7 +111,7 @@ async fn token_is_valid_until_expired_rotated_or_revoked() {
         .revoke_token(
             Actor::Operator,
             TokenId::new(),
-            CreatedCredentials::Keep,
+            RevocationExtent::TokenOnly,
             f.now,
         )
         .await;
@@ -148,7 +148,7 @@ async fn token_use_is_recorded_and_tokens_are_limited() {
     assert_eq!(used.last_used_at, Some(f.now));
     // A revoked token does not count towards the limit.
     f.store
-        .revoke_token(Actor::Operator, used.id, CreatedCredentials::Keep, f.now)
+        .revoke_token(Actor::Operator, used.id, RevocationExtent::TokenOnly, f.now)
         .await
         .unwrap();
     f.store
@@ -199,7 +199,7 @@ async fn operator_token_follows_its_file_and_stays_revoked() {
         .revoke_token(
             Actor::Operator,
             other_operator_token.id,
-            CreatedCredentials::Keep,
+            RevocationExtent::TokenOnly,
             f.now,
         )
         .await
@@ -325,9 +325,9 @@ async fn tokens_and_invitations_are_listed_page_by_page() {
     }
     let everyone = all_tokens(&f).await;
     for of in [
-        TokensOf::Everyone,
-        TokensOf::User(ada.id),
-        TokensOf::Member(ada.id, teams[0]),
+        TokenFilter::Everyone,
+        TokenFilter::User(ada.id),
+        TokenFilter::Member(ada.id, teams[0]),
     ] {
         let expected: Vec<TokenId> = everyone
             .iter()
@@ -348,7 +348,7 @@ async fn tokens_and_invitations_are_listed_page_by_page() {
         assert_eq!(found, expected, "{of:?}");
     }
     // A token of another team, and one that does not exist.
-    let of_alpha = TokensOf::Member(ada.id, teams[0]);
+    let of_alpha = TokenFilter::Member(ada.id, teams[0]);
     for after in [created[1].id, TokenId::new()] {
         let page = f
             .store
@@ -427,7 +427,7 @@ async fn ended_credentials_are_deleted_after_a_month() {
     let leaf = create(&f, 3, Some((next, [9; 32]))).await;
     for ended in [middle, next] {
         f.store
-            .revoke_token(Actor::Operator, ended, CreatedCredentials::Keep, f.now)
+            .revoke_token(Actor::Operator, ended, RevocationExtent::TokenOnly, f.now)
             .await
             .unwrap();
     }
@@ -439,7 +439,7 @@ async fn ended_credentials_are_deleted_after_a_month() {
         .revoke_token(
             Actor::Operator,
             of_operator,
-            CreatedCredentials::Keep,
+            RevocationExtent::TokenOnly,
             f.now,
         )
         .await
@@ -489,7 +489,7 @@ async fn ended_credentials_are_deleted_after_a_month() {
         .revoke_token(
             Actor::Operator,
             root,
-            CreatedCredentials::EndExcept(None),
+            RevocationExtent::WithCreatedExcept(None),
             f.now,
         )
         .await

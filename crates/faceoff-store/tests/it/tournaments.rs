@@ -89,7 +89,7 @@ async fn record(f: &TestStore, id: TournamentId) -> TournamentRecord {
 fn game_commit(recorded: bool) -> GameCommit {
     let hash = || "0".repeat(64);
     GameCommit {
-        score: json!({"steps": 500}),
+        results: json!({"steps": 500}),
         recording: recorded.then(|| GameRecording {
             key: "games/1/2".to_owned(),
             game_blake3: hash(),
@@ -244,7 +244,10 @@ async fn round_starts_once_and_ends_with_its_last_game() {
     let GameState::Played(played) = &over.games[0].state else {
         panic!("{:?}", over.games[0])
     };
-    assert_eq!((played.attempt, &played.score), (1, &json!({"steps": 500})));
+    assert_eq!(
+        (played.attempt, &played.results),
+        (1, &json!({"steps": 500}))
+    );
     let log = |side| f.store.game_log(over.games[0].id, side);
     assert_eq!(log(Side::First).await.unwrap().as_deref(), Some("home\n"));
     assert_eq!(log(Side::Second).await.unwrap().as_deref(), Some("away\n"));
@@ -357,10 +360,10 @@ async fn game_with_platform_faults_has_attempts_but_no_result() {
     assert_eq!(late, CommitOutcome::LeaseLost);
     f.store.release(&claim, f.now).await.unwrap();
     assert_eq!(state(&f, game).await, GameState::Queued);
-    for _ in 0..MAX_ATTEMPTS {
+    for _ in 0..MAX_PLATFORM_FAULTS {
         let (claim, _, _) = claim_game(&f).await;
         f.store
-            .release_failed(&claim, "no sandbox", f.now)
+            .release_after_platform_fault(&claim, "no sandbox", f.now)
             .await
             .unwrap();
         f.advance_clock_s(60);
@@ -373,7 +376,7 @@ async fn game_with_platform_faults_has_attempts_but_no_result() {
         .iter()
         .map(|attempt| attempt.end.as_ref().unwrap().outcome)
         .collect();
-    let failures = [AttemptOutcome::PlatformFailed; MAX_ATTEMPTS as usize];
+    let failures = [AttemptOutcome::PlatformFailed; MAX_PLATFORM_FAULTS as usize];
     assert_eq!(
         ends,
         [
@@ -437,7 +440,7 @@ async fn game_with_platform_faults_has_attempts_but_no_result() {
     let GameState::Played(played) = state(&f, game).await else {
         panic!()
     };
-    assert_eq!(played.attempt, 4 + MAX_ATTEMPTS);
+    assert_eq!(played.attempt, 4 + MAX_PLATFORM_FAULTS);
 }
 
 #[tokio::test]
@@ -1128,7 +1131,7 @@ async fn run_actions(actions: Vec<Action>) {
             Action::Fail(number) => {
                 if let Some((claim, _)) = pick(number) {
                     f.store
-                        .release_failed(&claim, "a platform fault", f.now)
+                        .release_after_platform_fault(&claim, "a platform fault", f.now)
                         .await
                         .unwrap();
                 }

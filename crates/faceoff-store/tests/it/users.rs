@@ -44,7 +44,7 @@ async fn returning_user_keeps_identity_and_gets_new_tokens() {
     assert_contains(&other_name.unwrap_err(), &["belongs to Ada"]);
     let request = JoinRequest {
         name: None,
-        password: Some("$argon2id$…".into()),
+        password_hash: Some("$argon2id$…".into()),
         ..join_request([2; 32], "Ada")
     };
     let joined = f.store.join(request, f.now).await.unwrap();
@@ -97,7 +97,7 @@ async fn renamed_user_keeps_access_and_signs_in_by_the_new_name() {
     assert_eq!(signs_in.map(|(id, _)| id), Some(ada.id));
     let events = f.store.events_after(0, 1000).await.unwrap();
     let renames = events.iter().filter_map(|record| match &record.event {
-        Event::PersonRenamed { from, to } => Some((from.as_str(), to.as_str())),
+        Event::UserRenamed { from, to } => Some((from.as_str(), to.as_str())),
         _ => None,
     });
     let expected = [("Ada", "ADA"), ("ADA", "Ada Lovelace")];
@@ -152,7 +152,7 @@ async fn removed_user_loses_all_access() {
         .iter()
         .find(|record| record.subject == Subject::User(ada.id) && record.id > 1)
         .unwrap();
-    assert!(matches!(joined.event, Event::PersonJoined { .. }));
+    assert!(matches!(joined.event, Event::UserJoined { .. }));
 }
 
 #[tokio::test]

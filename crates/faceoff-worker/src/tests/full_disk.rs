@@ -24,7 +24,7 @@ async fn full_disk_does_not_count_as_an_attempt() {
         assert_eq!(spec.platform_retries, 0, "no attempt was counted");
         // Skips the pause after each failure.
         clock_ahead_s.fetch_add(10, Ordering::SeqCst);
-        if calls.fetch_add(1, Ordering::SeqCst) < 3 * MAX_ATTEMPTS {
+        if calls.fetch_add(1, Ordering::SeqCst) < 3 * MAX_PLATFORM_FAULTS {
             return Err(PlatformFault::FullDisk("steps.parquet".into()));
         }
         Ok(())
@@ -34,7 +34,7 @@ async fn full_disk_does_not_count_as_an_attempt() {
     assert_eq!(evaluator.played.lock().unwrap().len(), 6);
     running.stop().await;
     let events = server.store.events_after(0, 1000).await.unwrap();
-    let is_counted = |record: &EventRecord| matches!(record.event, Event::JobReturned { .. });
+    let is_counted = |record: &EventRecord| matches!(record.event, Event::JobFailed { .. });
     assert!(!events.iter().any(is_counted), "{events:#?}");
 }
 

@@ -73,7 +73,7 @@ async fn wait_for_state(
 }
 
 /// Waits for the result of a game.
-async fn wait_for_result(server: &Server, id: GameId) -> GameResultRow {
+async fn wait_for_result(server: &Server, id: GameId) -> StoredGameResult {
     let state = wait_for_state(server, id, |state| !state.is_open()).await;
     let GameState::Played(result) = state else {
         panic!("{state:?}")
@@ -152,7 +152,7 @@ async fn platform_fault_ends_game_without_result_until_rerun() {
     };
     let mut events = server.store.events();
     let running = server.start_slots(1, &failing_evaluator);
-    for attempt in 1..=MAX_ATTEMPTS {
+    for attempt in 1..=MAX_PLATFORM_FAULTS {
         while ended_attempts(&server, game).await < attempt {
             let _ = events.recv().await;
         }
@@ -169,7 +169,7 @@ async fn platform_fault_ends_game_without_result_until_rerun() {
     );
     assert_eq!(
         attempt_outcomes(&server, game).await,
-        [AttemptOutcome::PlatformFailed; MAX_ATTEMPTS as usize]
+        [AttemptOutcome::PlatformFailed; MAX_PLATFORM_FAULTS as usize]
     );
     running.stop().await;
 
@@ -184,8 +184,8 @@ async fn platform_fault_ends_game_without_result_until_rerun() {
     };
     let running = server.start_slots(1, &healthy_evaluator);
     let result = wait_for_result(&server, game).await;
-    assert_eq!(result.attempt, MAX_ATTEMPTS + 1);
-    assert_eq!(result.score["sides"][0]["score"], 1);
+    assert_eq!(result.attempt, MAX_PLATFORM_FAULTS + 1);
+    assert_eq!(result.results["sides"][0]["score"], 1);
     for (side, expected) in Side::BOTH.into_iter().zip(["first log\n", "second log\n"]) {
         let log = server.store.game_log(game, side).await.unwrap();
         assert_eq!(log.as_deref(), Some(expected));
@@ -216,7 +216,7 @@ async fn only_the_recording_of_the_last_result_is_kept() {
     server.put_artifact(&killed, b"PK").await;
     let evaluator = ScriptedEvaluator::with_game(|_, _| Ok(()));
     let running = server.start_slots(1, &evaluator);
-    let files = |result: &GameResultRow| {
+    let files = |result: &StoredGameResult| {
         let recording = result.recording.as_ref().expect("a round's game has one");
         ["game.zip", "side-1.zip", "side-2.zip"].map(|name| format!("{}/{name}", recording.key))
     };

@@ -78,7 +78,7 @@ async fn checked_state(
 ) -> SubmissionState {
     loop {
         let state = server.store.submission(id).await.unwrap().state;
-        if state.is_checked() {
+        if state.validation_is_over() {
             return state;
         }
         let _ = events.recv().await;

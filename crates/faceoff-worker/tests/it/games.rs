@@ -39,9 +39,9 @@ async fn play_round(server: &Server, teams: &[TeamId], slots: usize) -> Vec<(Val
     let worker = server.start_worker(slots);
     let results = wait_for_results(server, games[0].tournament).await;
     worker.stop().await;
-    let summary = |result: &GameResultRow| {
+    let summary = |result: &StoredGameResult| {
         let motion = read_from_recording(recording(server, result), "motion.parquet");
-        (without_times(&result.score), blake3::hash(&motion))
+        (without_times(&result.results), blake3::hash(&motion))
     };
     results.iter().map(summary).collect()
 }
@@ -99,7 +99,7 @@ async fn hostile_agents_lose_without_harming_the_opponent() {
     let results = wait_for_results(&server, games[0].tournament).await;
     worker.stop().await;
     for (game, result) in games.iter().zip(&results) {
-        let score = &result.score;
+        let score = &result.results;
         let side = usize::from(game.teams[0] != harmless);
         let (harmless, hostile) = (&score["sides"][side], &score["sides"][1 - side]);
         let counts = (&harmless["faults"], &harmless["fouls"]);
@@ -144,7 +144,7 @@ async fn late_answers_are_no_fault_and_do_not_affect_the_opponent() {
     let worker = server.start_worker(1);
     let results = wait_for_results(&server, games[0].tournament).await;
     worker.stop().await;
-    let score = &results[0].score;
+    let score = &results[0].results;
     let [late, punctual] = [&score["sides"][0], &score["sides"][1]];
     assert_eq!(score["end"], "played");
     assert_eq!(

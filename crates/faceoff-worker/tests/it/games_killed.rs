@@ -56,7 +56,7 @@ async fn tournament_survives_killed_servers() {
 
     let (mut lost, mut games_of_team) = (0, BTreeMap::new());
     for (game, result) in games.iter().zip(&results) {
-        assert_eq!(result.score["steps"], 2);
+        assert_eq!(result.results["steps"], 2);
         for team in game.teams {
             *games_of_team.entry(team).or_insert(0) += 1;
         }

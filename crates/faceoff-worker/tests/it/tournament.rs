@@ -62,7 +62,7 @@ pub fn all_pairs(teams: &[TeamId]) -> Vec<[TeamId; 2]> {
 }
 
 /// Waits until a tournament's games are over. Returns their results in the order of play.
-pub async fn wait_for_results(server: &Server, tournament: TournamentId) -> Vec<GameResultRow> {
+pub async fn wait_for_results(server: &Server, tournament: TournamentId) -> Vec<StoredGameResult> {
     wait_for(&server.store, async || {
         let games = server.store.games(tournament, GameFilter::Rounds).await;
         let results = games.unwrap().into_iter().map(|game| match game.state {
@@ -76,7 +76,7 @@ pub async fn wait_for_results(server: &Server, tournament: TournamentId) -> Vec<
 }
 
 /// The path of a game's stored recording, which must have the reported hash.
-pub fn recording(server: &Server, result: &GameResultRow) -> PathBuf {
+pub fn recording(server: &Server, result: &StoredGameResult) -> PathBuf {
     let recording = result.recording.as_ref().expect("a round's game has one");
     let folder = server.path().join("data/artifacts").join(&recording.key);
     let archive = folder.join("game.zip");

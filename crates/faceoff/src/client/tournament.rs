@@ -10,7 +10,7 @@ use faceoff_api::{
     views::{
         champion_shares::ChampionSharesView,
         game::{GameView, TestGamesView},
-        tournament::{RoundView, TournamentHead, TournamentView},
+        tournament::{RoundView, TournamentSummary, TournamentView},
     },
 };
 use faceoff_scoring::tournament::{HeadToHead, rating::Ratings};
@@ -19,7 +19,7 @@ use reqwest::Method;
 
 impl Client {
     /// All tournaments, the oldest first.
-    pub async fn tournaments(&self) -> anyhow::Result<Vec<TournamentHead>> {
+    pub async fn tournaments(&self) -> anyhow::Result<Vec<TournamentSummary>> {
         self.get("/tournaments").await
     }
 

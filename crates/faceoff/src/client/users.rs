@@ -3,7 +3,7 @@
 use super::{Client, read_json};
 use faceoff_api::{
     requests::{
-        Confirmation, CreatedWithToken, Decision, JoinRequest, NewAnnouncement, NewAnswer,
+        Confirmation, CreatedCredentials, Decision, JoinRequest, NewAnnouncement, NewAnswer,
         NewInvitation, NewPassword, NewQuestion, NewTeam, NewTerms, NewToken, Reason,
         RegistrationRequest, RevocationQuery, SeasonChange, TeamChange, UserChange,
     },
@@ -44,7 +44,7 @@ impl Client {
     pub async fn revoke_token(
         &self,
         id: TokenId,
-        made: Option<CreatedWithToken>,
+        made: Option<CreatedCredentials>,
     ) -> anyhow::Result<RevokedTokenView> {
         let request = self.request(Method::DELETE, &format!("/tokens/{id}"));
         let request = request.query(&RevocationQuery { made });

@@ -9,7 +9,7 @@ use crate::client::Client;
 use anyhow::Context;
 use clap::{Args, Subcommand};
 use faceoff_api::{
-    requests::{CreatedWithToken, NewToken},
+    requests::{CreatedCredentials, NewToken},
     views::token::TokenView,
 };
 use faceoff_types::{TeamId, TokenId};
@@ -121,8 +121,8 @@ pub(super) async fn run_action(
             end_made,
         } => {
             let made = match (keep_made, end_made) {
-                (true, _) => Some(CreatedWithToken::Keep),
-                (false, true) => Some(CreatedWithToken::End),
+                (true, _) => Some(CreatedCredentials::Keep),
+                (false, true) => Some(CreatedCredentials::End),
                 (false, false) => None,
             };
             let revoked = client.revoke_token(token, made).await?;

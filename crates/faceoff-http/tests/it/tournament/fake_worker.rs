@@ -5,7 +5,7 @@ use crate::site::{LEASE_S, Site};
 use faceoff_airhockey::{EE, EVALUATION, competition};
 use faceoff_scoring::{
     tier_of,
-    tournament::{Forfeit, GameScore, GameTally, SideScore, final_score, judge},
+    tournament::{ForfeitKind, GameScore, GameTally, SideScore, final_score, judge},
 };
 use faceoff_store::{
     ClaimedJob, CommitOutcome, Game, GameCommit, GamePurpose, GameRecording, Job, JobClaim,
@@ -50,7 +50,7 @@ impl GameOutcome {
         let windows = self.windows;
         let forfeits = self
             .forfeits
-            .map(|forfeits| forfeits.then_some(Forfeit::Faults));
+            .map(|forfeits| forfeits.then_some(ForfeitKind::Faults));
         let played = final_score(self.goals, self.fouls);
         let result = judge(&GameTally {
             score: played,
@@ -136,7 +136,7 @@ pub async fn commit(
         _ => Some(store_files(site, claim, game).await),
     };
     let commit = GameCommit {
-        score: outcome.score([&team_names[0], &team_names[1]], seed),
+        results: outcome.score([&team_names[0], &team_names[1]], seed),
         recording,
         logs: team_names.map(|name| format!("{name} was here\n")),
     };

@@ -194,7 +194,10 @@ pub(crate) async fn remove_entrant(
             entrants::remove(tx, id, team).await?;
             cancel_open_games(tx, id, team, None, &cancel_reason).await?;
             let reason = reason.clone();
-            tx.record(Subject::Tournament(id), Event::TeamOut { team, reason });
+            tx.record(
+                Subject::Tournament(id),
+                Event::EntrantRemoved { team, reason },
+            );
             return Ok(None);
         }
         (None, _) => latest_round(tx, tournament, kind).await?,

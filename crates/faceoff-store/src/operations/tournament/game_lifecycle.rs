@@ -27,7 +27,7 @@ use uuid::Uuid;
 /// The account charged with a game's slot time: that of the tournament, or of the team that requested the game. For many
 /// games it is looked up once, since the lookup reads the whole queue.
 pub(super) async fn open_account(tx: &mut Tx, game: &Game, job: NewJob) -> Result<SlotTimeAccount> {
-    let holder = match game.purpose {
+    let owner = match game.purpose {
         GamePurpose::Round(_)
         | GamePurpose::ScheduleReplay { .. }
         | GamePurpose::Test { asked_by: None } => game.tournament.to_string(),
@@ -36,7 +36,7 @@ pub(super) async fn open_account(tx: &mut Tx, game: &Game, job: NewJob) -> Resul
         }
         | GamePurpose::Friendly { asked_by: team } => team.to_string(),
     };
-    queue::open_account(tx, job.lane, &holder).await
+    queue::open_account(tx, job.lane, &owner).await
 }
 
 /// Adds a game's job to the queue. Games of a round are queued by matchday (the games that teams play at the same time).
@@ -141,7 +141,7 @@ pub(crate) async fn give_up(tx: &mut Tx, id: GameId, reason: &str) -> Result<()>
     game_attempts::end(tx, id, AttemptOutcome::Lost, Some(reason), now).await?;
     game_transitions::set_without_result(tx, id, NoResult::PlatformFailed, reason, now).await?;
     let reason = reason.to_owned();
-    tx.record(Subject::Game(id), Event::GameBroken { reason });
+    tx.record(Subject::Game(id), Event::GamePlatformFailed { reason });
     match games::find(tx, id).await {
         Ok(game) => end_round_of_game(tx, &game).await,
         // A damaged game must end, too: it would block the queue otherwise.

@@ -116,7 +116,7 @@ impl Store {
                     count += 1;
                 }
             }
-            let event = Event::ReplaysOrdered {
+            let event = Event::ScheduleReplaysRequested {
                 times,
                 games: count,
             };
@@ -147,7 +147,7 @@ impl Store {
             if count > 0 {
                 tx.record(
                     Subject::Tournament(id),
-                    Event::ReplaysCancelled { games: count },
+                    Event::ScheduleReplaysCancelled { games: count },
                 );
             }
             Ok(count)

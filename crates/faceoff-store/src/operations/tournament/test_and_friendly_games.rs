@@ -131,7 +131,7 @@ impl Store {
             game_lifecycle::enqueue(tx, &game, purpose::TEST_OR_FRIENDLY_GAME).await?;
             tx.record(
                 Subject::Game(id),
-                Event::FreeGameQueued {
+                Event::TestOrFriendlyGameQueued {
                     team,
                     opponent: None,
                 },
@@ -181,7 +181,7 @@ impl Store {
                 state: GameState::Queued,
             };
             game_lifecycle::enqueue(tx, &game, purpose::TEST_OR_FRIENDLY_GAME).await?;
-            let event = Event::FreeGameQueued {
+            let event = Event::TestOrFriendlyGameQueued {
                 team: asked_by,
                 opponent: Some(opponent),
             };

@@ -6,19 +6,19 @@ use crate::commands::{
 };
 use faceoff_api::views::{
     champion_shares::ChampionSharesView,
-    tournament::{EntrantView, RoundView, TournamentHead, TournamentPhase, TournamentView},
+    tournament::{EntrantView, RoundView, TournamentPhase, TournamentSummary, TournamentView},
 };
 use faceoff_scoring::tournament::schedule::{Table, TableScope};
 use faceoff_types::{DepartureKind, Publication, RoundNumber, TournamentFormat, TournamentRules};
 
-pub(in crate::commands) fn tournament_list(tournaments: &[TournamentHead]) -> String {
-    let line = |head: &TournamentHead| {
+pub(in crate::commands) fn tournament_list(tournaments: &[TournamentSummary]) -> String {
+    let line = |summary: &TournamentSummary| {
         format!(
             "{}  {}  {}: {}",
-            head.id,
-            head.name,
-            phase_text(head),
-            head.next
+            summary.id,
+            summary.name,
+            phase_text(summary),
+            summary.next
         )
     };
     lines_or(
@@ -27,19 +27,19 @@ pub(in crate::commands) fn tournament_list(tournaments: &[TournamentHead]) -> St
     )
 }
 
-fn phase_text(head: &TournamentHead) -> String {
-    let phase = match head.phase {
+fn phase_text(summary: &TournamentSummary) -> String {
+    let phase = match summary.phase {
         TournamentPhase::Open => "open",
         TournamentPhase::Round => "round running",
         TournamentPhase::Between => "between rounds",
         TournamentPhase::Played => "all rounds finished",
         TournamentPhase::Closed => "closed",
     };
-    let paused = match (&head.paused, head.phase) {
+    let paused = match (&summary.paused, summary.phase) {
         (Some(_), phase) if phase != TournamentPhase::Closed => ", paused",
         _ => "",
     };
-    let champion = match &head.champion {
+    let champion = match &summary.champion {
         Some(team) => format!(", champion {team}"),
         None => String::new(),
     };
@@ -48,11 +48,11 @@ fn phase_text(head: &TournamentHead) -> String {
 
 /// A tournament with rules, teams, rounds and standings.
 pub(in crate::commands) fn tournament_text(tournament: &TournamentView) -> String {
-    let head = &tournament.head;
+    let summary = &tournament.summary;
     let settings = &tournament.settings;
     let mut lines = vec![
-        format!("{} ({})", head.name, phase_text(head)),
-        format!("  id        {}", head.id),
+        format!("{} ({})", summary.name, phase_text(summary)),
+        format!("  id        {}", summary.id),
         format!("  rules     {}", rules_text(&tournament.rules)),
         format!(
             "  settings  up to {} friendly and test games per team and day; recordings {}",
@@ -68,7 +68,7 @@ pub(in crate::commands) fn tournament_text(tournament: &TournamentView) -> Strin
             None => "  baseline  none, so test games are not possible".to_owned(),
         },
     ];
-    lines.extend(head.paused.as_ref().map(|paused| {
+    lines.extend(summary.paused.as_ref().map(|paused| {
         format!(
             "  paused    since {}: {}",
             time_text(paused.at),
@@ -83,7 +83,7 @@ pub(in crate::commands) fn tournament_text(tournament: &TournamentView) -> Strin
         lines.push(format!("  {title:<8}  {}", entrant_text(entrant)));
     }
     lines.extend(tournament.rounds.iter().map(round_text));
-    lines.push(format!("  next      {}", head.next));
+    lines.push(format!("  next      {}", summary.next));
     let tables = tournament.tables.iter();
     let tables: String = tables
         .filter(|table| !table.standings.is_empty())

@@ -68,7 +68,7 @@ fn violations(course: &SideCourse, start: u32) -> impl Iterator<Item = (u32, f64
                     to.min(*samples.end()) - from.max(*samples.start()) + 1
                 })
                 .sum();
-            let worst = in_window()
+            let max_excess = in_window()
                 .map(|violation| violation.max_excess)
                 .fold(0.0, f64::max);
             let cause = format!(

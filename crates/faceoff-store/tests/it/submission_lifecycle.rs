@@ -50,7 +50,7 @@ async fn submission_reaches_board_after_upload_and_runs() {
         assert_eq!(progress.episodes_done, EPISODES_PER_SHARD * shards_done + 1);
         let an_hour_later = f.now + jiff::SignedDuration::from_hours(1);
         assert_eq!(
-            progress.in_whole_shards(an_hour_later),
+            progress.episodes_visible_to_team(an_hour_later),
             EPISODES_PER_SHARD * shards_done
         );
         f.advance_clock_s(1);

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-/// Whose request it is, as far as known. Under overload the server keeps places for the later ones.
+/// The kind of caller, as far as known, in ascending priority: under overload the last places are kept for the higher ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Precedence {
     /// Without a token that was verified before.
@@ -14,20 +14,20 @@ pub enum Precedence {
     Organiser,
 }
 
-/// A limited number of places, for requests or connections.
+/// A limited number of places, for requests or connections, of which the last are kept for teams and organisers.
 #[derive(Debug, Clone)]
-pub struct Places {
+pub struct PriorityPermits {
     max: usize,
     free: Arc<Semaphore>,
 }
 
 /// A place, until it is dropped.
 #[derive(Debug)]
-pub struct Place {
+pub struct PriorityPermit {
     _permit: OwnedSemaphorePermit,
 }
 
-impl Places {
+impl PriorityPermits {
     pub fn new(max: usize) -> Self {
         Self {
             max,
@@ -37,14 +37,14 @@ impl Places {
 
     /// Takes a place. Visitors get one while at most three quarters of the places are taken with it, teams up to seven eighths,
     /// and organisers up to the last one.
-    pub fn take(&self, precedence: Precedence) -> Option<Place> {
+    pub fn take(&self, precedence: Precedence) -> Option<PriorityPermit> {
         let available = match precedence {
             Precedence::Visitor => (self.max * 3).div_ceil(4),
             Precedence::Team => (self.max * 7).div_ceil(8),
             Precedence::Organiser => self.max,
         };
         let permit = Arc::clone(&self.free).try_acquire_owned().ok()?;
-        (self.taken() <= available).then_some(Place { _permit: permit })
+        (self.taken() <= available).then_some(PriorityPermit { _permit: permit })
     }
 
     /// Number of places that are taken.
@@ -72,7 +72,7 @@ mod tests {
             (4, [3, 4, 4]),
             (512, [384, 448, 512]),
         ] {
-            let places = Places::new(max);
+            let places = PriorityPermits::new(max);
             let mut held = Vec::new();
             let taken = order.map(|precedence| {
                 while let Some(place) = places.take(precedence) {
