@@ -73,7 +73,7 @@ struct Page {
     is_round_game: bool,
     state: String,
     /// The team whose departure excluded the game from the standings.
-    withdrawn_team: Option<String>,
+    departed_team: Option<String>,
     /// What happens next, as a sentence.
     next_step: String,
     /// Is the game queued or running?
@@ -160,7 +160,7 @@ pub(super) async fn page(
         is_round_game: matches!(view.purpose, PurposeView::Round { .. }),
         purpose: purpose_text(&view.purpose),
         state: state_text(&view.status, is_hidden),
-        withdrawn_team: view.excluded_by.map(|team| team.to_string()),
+        departed_team: view.excluded_by.map(|team| team.to_string()),
         next_step: view.next,
         is_open: matches!(view.status, GameStatus::Queued | GameStatus::Running { .. }),
         has_result: matches!(view.status, GameStatus::Played { .. }),

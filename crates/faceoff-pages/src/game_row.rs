@@ -18,7 +18,7 @@ pub(super) struct GameRow {
     /// The result, or the state of the game.
     pub(super) summary: String,
     /// The team whose departure excluded the game from the standings.
-    pub(super) withdrawn_team: Option<TeamName>,
+    pub(super) departed_team: Option<TeamName>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,7 +61,7 @@ impl GameRow {
             is_second_of_pair: second_half,
             state: game_state(&view.status, &teams, is_hidden),
             summary: summary(&view.status, is_hidden),
-            withdrawn_team: view.excluded_by.clone(),
+            departed_team: view.excluded_by.clone(),
             team_ids: sides.map(|side| side.team),
             teams,
         })

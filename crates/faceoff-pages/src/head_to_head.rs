@@ -118,7 +118,7 @@ pub(super) async fn page(
         .collect();
     let counted: Vec<_> = played
         .iter()
-        .filter(|(row, _)| row.withdrawn_team.is_none())
+        .filter(|(row, _)| row.departed_team.is_none())
         .copied()
         .collect();
     render(&Page {

@@ -86,7 +86,7 @@ async fn page_with(
     let all_games = all_games.iter().rev();
     let all_games: Vec<GameRow> = all_games
         .filter_map(|game| GameRow::new(game, false))
-        .filter(|game| game.withdrawn_team.is_none())
+        .filter(|game| game.departed_team.is_none())
         .collect();
     let select = |is_selected: fn(&GameState) -> bool| {
         let selected = all_games.iter().filter(|game| is_selected(&game.state));

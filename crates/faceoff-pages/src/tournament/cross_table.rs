@@ -80,14 +80,14 @@ impl Cell {
             game.teams[1 - side],
             game.round
         ));
-        if game.withdrawn_team.is_some() {
+        if game.departed_team.is_some() {
             description.push_str(", does not count");
         }
         Self {
             game: game.id,
             label,
             symbol,
-            class: if game.withdrawn_team.is_some() {
+            class: if game.departed_team.is_some() {
                 "excluded"
             } else {
                 class
