@@ -10,9 +10,7 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::Value;
 use std::{
     collections::BTreeSet,
-    fs,
     io::{Cursor, Read as _},
-    path::Path,
     time::{Duration, Instant},
 };
 

@@ -15,7 +15,7 @@ from machine import PATH, Machine, debian
 
 FOLDER = Path(__file__).parent
 NOTE = re.compile(r"^note: your agent runs without these layers .* get here: (.*); `faceoff doctor` says how$", re.MULTILINE)
-# What no ordinary user has whom systemd gives no control groups.
+# The layers that an ordinary user lacks if systemd gives the user no control groups.
 CGROUPS = ["cgroup-memory", "cgroup-pids", "cgroup-cpu"]
 WITHOUT_NAMESPACES = ["namespaces", *CGROUPS]
 

@@ -60,11 +60,13 @@ ENV: dict[str, Any] = HELLO["env"]
 
 OBSERVATION = [1.0, 0.1, 0.2, -1.0, -0.1, -0.2, *model.START_Q, *[0.0] * 7]
 
+# Base frames (table from robot) of robot 1 and robot 2.
 HOME, AWAY = np.eye(4), np.diag([-1.0, -1.0, 1.0, 1.0])
 HOME[:3, 3], AWAY[:3, 3] = (-1.51, 0.0, -0.1), (1.51, 0.0, -0.1)
 
 ROBOT = (RobotModel(), RobotData())
 
+# 40 random poses, rad.
 Q = np.random.default_rng(0).uniform(-0.9, 0.9, (40, 7)) * model.POSITION_LIMIT_RAD
 
 

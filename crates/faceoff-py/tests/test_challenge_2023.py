@@ -40,8 +40,8 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def own_imports(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Undoes what loading a team's code changes in this process."""
+def restored_imports(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """After the test, undoes what loading a team's code has changed in this process."""
     path, folder, modules = list(sys.path), os.getcwd(), set(sys.modules)
     yield
     sys.path[:] = path
@@ -228,7 +228,7 @@ def test_objects_that_are_no_agents_are_refused(tmp_path: Path) -> None:
 
 
 def test_other_package_of_2023_in_the_process_is_refused(
-    own_imports: None, bundle: Path, monkeypatch: pytest.MonkeyPatch
+    restored_imports: None, bundle: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "air_hockey_challenge", type(sys)("air_hockey_challenge"))
     for call in (install_substitute, lambda: load_builder(bundle / "team")):
@@ -237,7 +237,7 @@ def test_other_package_of_2023_in_the_process_is_refused(
 
 
 def test_agent_acts_alike_with_and_without_mujoco(
-    own_imports: None, bundle: Path, monkeypatch: pytest.MonkeyPatch
+    restored_imports: None, bundle: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("mujoco")
     build_agent = load_builder(bundle / "team")

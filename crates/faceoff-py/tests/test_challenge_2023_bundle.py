@@ -117,9 +117,9 @@ def test_arguments_of_make_bundle_are_checked(tmp_path: Path) -> None:
         ((TEAM, tmp_path / "file" / "bundle"), {}, "bundle: expected a folder that can be created"),
         ((3, tmp_path / "b"), {}, "folder: expected the path of a folder, got 3"),
         ((TEAM, ""), {}, "bundle: expected the path of a folder, got ''"),
-        ((TEAM, tmp_path / "b"), {"name": "two\nlines"}, "name: expected 1 to 64 printable characters"),
+        ((TEAM, tmp_path / "b"), {"name": "two\nlines"}, "name: expected 1 to 60 printable characters"),
         ((TEAM, tmp_path / "b"), {"name": 3}, "name: expected a text, got 3"),
-        ((TEAM, tmp_path / "b"), {"runtime": ""}, "runtime: expected 1 to 64"),
+        ((TEAM, tmp_path / "b"), {"runtime": ""}, "runtime: expected 1 to 40"),
     ]:
         with pytest.raises(faceoff.Error, match=message):
             make_bundle(*arguments, **options)  # type: ignore[arg-type]

@@ -143,7 +143,7 @@ def test_agent_base_has_what_mushroom_rl_gave_it(info: dict[str, Any]) -> None:
         AgentBase({})
 
 
-class Saved(AgentBase):
+class SavableAgent(AgentBase):
     def __init__(self, env_info: dict[str, Any], **kwargs: Any) -> None:
         super().__init__(env_info, **kwargs)
         self.gain, self.weights, self.names = 2.5, np.arange(3.0), {"a": [1, 2]}
@@ -161,17 +161,17 @@ class Saved(AgentBase):
 
 
 def test_saved_agent_is_loaded_with_its_attributes(info: dict[str, Any], tmp_path: Path) -> None:
-    agent = Saved(info)
-    agent.inner = Saved(info)
+    agent = SavableAgent(info)
+    agent.inner = SavableAgent(info)
     agent.inner.gain = 7.0
     agent.save(tmp_path / "models" / "agent.msh")
-    loaded = Saved.load_agent(tmp_path / "models" / "agent.msh", info, agent_id=2)
+    loaded = SavableAgent.load_agent(tmp_path / "models" / "agent.msh", info, agent_id=2)
     assert (loaded.gain, loaded.names, loaded.table, loaded.agent_id) == (2.5, {"a": [1, 2]}, [1, "x"], 2)
     assert (loaded.thing, loaded.buffer, loaded.inner.gain, loaded.preprocessors) == (None, None, 7.0, [])
     np.testing.assert_array_equal(loaded.weights, np.arange(3.0))
     assert loaded.mdp_info.shape == (20, 7) and loaded.env_info is info
     agent.save(tmp_path / "full.msh", full_save=True)
-    np.testing.assert_array_equal(Saved.load(tmp_path / "full.msh").buffer, np.zeros(4))
+    np.testing.assert_array_equal(SavableAgent.load(tmp_path / "full.msh").buffer, np.zeros(4))
 
 
 def test_file_of_mushroom_rl_is_read(info: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -190,11 +190,11 @@ def test_file_of_mushroom_rl_is_read(info: dict[str, Any], tmp_path: Path, monke
             "save_attributes": {"observation_space": "mushroom", "gamma": "primitive"},
             "primitive_dictionary": {"gamma": 0.9},
         }
-        agent = {"type": Saved, "save_attributes": {"mdp_info": "mushroom"}, "primitive_dictionary": {}}
+        agent = {"type": SavableAgent, "save_attributes": {"mdp_info": "mushroom"}, "primitive_dictionary": {}}
         archive.writestr("agent.config", pickle.dumps(agent))
         archive.writestr("mdp_info.mushroom/agent.config", pickle.dumps(mdp))
         archive.writestr("mdp_info.mushroom/observation_space.mushroom/agent.config", pickle.dumps(box))
-    loaded = Saved.load_agent(tmp_path / "old.msh", info)
+    loaded = SavableAgent.load_agent(tmp_path / "old.msh", info)
     assert isinstance(loaded.mdp_info, MDPInfo) and loaded.mdp_info.gamma == 0.9
     assert isinstance(loaded.mdp_info.observation_space, Box) and loaded.mdp_info.observation_space.low == [0.0]
 

@@ -70,7 +70,7 @@ def test_environment_and_evaluator_have_the_same_episodes() -> None:
 
 
 def test_policies_are_reset_before_each_episode() -> None:
-    class Counting:
+    class CountingPolicy:
         def __init__(self) -> None:
             self.resets: list[tuple[str, int]] = []
 
@@ -82,7 +82,7 @@ def test_policies_are_reset_before_each_episode() -> None:
             assert observation.shape == ((23,) if self.resets[-1][0] == "hit" else (20,))
             return np.zeros(7)
 
-    hit, defend = Counting(), Counting()
+    hit, defend = CountingPolicy(), CountingPolicy()
     faceoff.evaluate({"hit": hit, "defend": defend}, tasks=["defend", "hit"], episodes=2)
     assert hit.resets == [("hit", 0), ("hit", 1)]
     assert defend.resets == [("defend", 0), ("defend", 1)]
@@ -143,7 +143,7 @@ def test_dataset_has_the_seed_of_its_robot(tmp_path: Path) -> None:
     dataset = faceoff.dataset.open(tmp_path)
     actions = [dataset.episode("defend", episode).to_numpy().actions for episode in range(4)]
 
-    class Recorded:
+    class RecordedPolicy:
         def reset(self, task: str, episode: int) -> None:
             self.actions = iter(actions[episode])
 
@@ -154,7 +154,7 @@ def test_dataset_has_the_seed_of_its_robot(tmp_path: Path) -> None:
     def observations(mismatch_seed: str | None) -> list[np.ndarray]:
         seen.clear()
         faceoff.evaluate(
-            Recorded(), tasks="defend", episodes=4, seed=17, mismatch_seed=mismatch_seed, interpolation=3,
+            RecordedPolicy(), tasks="defend", episodes=4, seed=17, mismatch_seed=mismatch_seed, interpolation=3,
             action_mode="raw",
         )
         return list(seen)

@@ -75,7 +75,7 @@ def test_models_are_accepted_as_object_and_as_path(tmp_path: Path) -> None:
         np.testing.assert_allclose(exported(observation), own(observation), atol=1e-6)
 
 
-def wrapped(env: Any) -> Any:
+def with_all_wrappers(env: Any) -> Any:
     """An environment with each wrapper that can be exported, after some steps."""
     env = wrappers.RecordEpisodeStatistics(env)
     env = wrappers.ClipAction(wrappers.RescaleAction(wrappers.FlattenObservation(env), -3.0, 2.0))
@@ -91,7 +91,7 @@ def wrapped(env: Any) -> Any:
 
 def test_wrappers_are_part_of_the_graph(tmp_path: Path) -> None:
     """The wrappers themselves give the expected action."""
-    env = wrapped(gymnasium.make("faceoff/AirHockey-Defend-v0"))
+    env = with_all_wrappers(gymnasium.make("faceoff/AirHockey-Defend-v0"))
     model = linear_policy(20, 7, scale=0.5, bounded=False)
     exported = graph_of(faceoff.export(model, tmp_path / "agent", env=env))
     normaliser = env.env
@@ -141,7 +141,7 @@ def test_mallet_bundle_contains_the_compiled_inverse(tmp_path: Path) -> None:
         assert done.stdout == f"{folder}/faceoff/__init__.py True\n"
 
 
-class Joints:
+class JointPolicy:
     """A policy of `linear_policy` for `faceoff.evaluate`, from the environment's observation to its action."""
 
     def __init__(self, model: onnx.ModelProto) -> None:
@@ -151,7 +151,7 @@ class Joints:
         return self.act(environment_observation(observation)).astype(np.float64)
 
 
-class Mallet(Joints):
+class MalletPolicy(JointPolicy):
     """The same for mallet velocities."""
 
     def __init__(self, model: onnx.ModelProto) -> None:
@@ -182,10 +182,10 @@ def test_program_scores_the_agent_like_the_policy(kind: str, tmp_path: Path) -> 
     env: Any
     if kind == "joints":
         model, arguments = linear_policy(20, 7, scale=0.1), {"interpolation": 1, "action_mode": "delta"}
-        env, policy = AirHockeyEnv("defend"), Joints(model)
+        env, policy = AirHockeyEnv("defend"), JointPolicy(model)
     else:
         model, arguments = linear_policy(20, 2), {"interpolation": 3, "action_mode": "raw"}
-        env, policy = MalletPlane(AirHockeyEnv("defend", interpolation=3, action_mode="raw"), 1.5), Mallet(model)
+        env, policy = MalletPlane(AirHockeyEnv("defend", interpolation=3, action_mode="raw"), 1.5), MalletPolicy(model)
     folder = faceoff.export(model, tmp_path / "agent", env=env)
     command = [PROGRAM, "eval", folder, "--task", "defend", "--task", "prepare", "--episodes", "10", "--json", "--config"]
     done = subprocess.run(

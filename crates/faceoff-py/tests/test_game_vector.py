@@ -217,15 +217,15 @@ def test_damaged_state_of_a_game_is_refused() -> None:
 # --- opponents ---------------------------------------------------------------------------------------------------
 
 
-class Pool:
-    """Opponents that count their games and rows."""
+class CountingOpponent:
+    """An opponent that records the games it starts, and counts the rows of observations that it gets."""
 
     def __init__(self) -> None:
-        self.begun: list[int] = []
+        self.started_games: list[int] = []
         self.rows = 0
 
     def reset(self, games: np.ndarray) -> None:
-        self.begun += games.tolist()
+        self.started_games += games.tolist()
 
     def __call__(self, observations: np.ndarray) -> np.ndarray:
         assert observations.shape[1] == 23
@@ -235,19 +235,19 @@ class Pool:
 
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
 def test_each_game_is_played_against_one_opponent_of_the_pool(mode: str) -> None:
-    first, second = Pool(), Pool()
+    first, second = CountingOpponent(), CountingOpponent()
     envs = SelfPlayVectorEnv(8, [first, second], max_steps=10, autoreset_mode=mode)
     _, infos = envs.reset(seed=2)
     assert set(infos["opponent"]) == {0, 1}
-    late = Pool()
+    late = CountingOpponent()
     envs.opponents.append(late)
     for actions in random_actions(8, 44):
         envs.step(actions)
-    games = len(first.begun) + len(second.begun) + len(late.begun)
+    games = len(first.started_games) + len(second.started_games) + len(late.started_games)
     # In 44 steps four games end; with NextStep each takes a step more, in which the next one begins.
     assert games == 8 * 5
-    assert late.begun
-    assert sorted(set(first.begun + second.begun + late.begun)) == list(range(8))
+    assert late.started_games
+    assert sorted(set(first.started_games + second.started_games + late.started_games)) == list(range(8))
 
 
 def test_opponent_and_side_follow_from_seed_and_number() -> None:
@@ -270,7 +270,7 @@ def test_opponent_and_side_follow_from_seed_and_number() -> None:
 
 
 def test_games_keep_their_opponent_while_the_pool_changes() -> None:
-    old, new = Pool(), Pool()
+    old, new = CountingOpponent(), CountingOpponent()
     envs = SelfPlayVectorEnv(3, [old, old], max_steps=4, autoreset_mode="SameStep")
     envs.reset(seed=1)
     envs.opponents[:] = [new]
@@ -294,7 +294,7 @@ def test_invalid_pool_is_refused_before_the_step() -> None:
 
 
 def test_opponents_play_no_game_that_is_over() -> None:
-    class Log(Pool):
+    class LoggingOpponent(CountingOpponent):
         def __call__(self, observations: np.ndarray) -> np.ndarray:
             calls.append("act")
             return super().__call__(observations)
@@ -303,7 +303,7 @@ def test_opponents_play_no_game_that_is_over() -> None:
             calls.append("reset")
 
     calls: list[str] = []
-    envs = SelfPlayVectorEnv(1, [Log()], max_steps=2)
+    envs = SelfPlayVectorEnv(1, [LoggingOpponent()], max_steps=2)
     envs.reset(seed=1)
     for _ in range(4):
         envs.step(np.zeros((1, 7)))

@@ -281,7 +281,8 @@ def test_checks_of_all_render_modes_pass_without_display(task: str, monkeypatch:
 # --- arguments of gymnasium.make ---------------------------------------------------------------------------------
 
 
-def played_to_the_end(env: Any, **reset: Any) -> tuple[int, dict[str, Any]]:
+def play_to_the_end(env: Any, **reset: Any) -> tuple[int, dict[str, Any]]:
+    """Plays an episode without motion; the number of its steps, and the last step's info. `reset`: arguments of `reset`."""
     env.reset(**reset)
     for steps in range(1, 1_000):
         *_, terminated, truncated, info = env.step(np.zeros(7, np.float32))
@@ -295,8 +296,8 @@ def test_time_limit_of_make_ends_episodes_with_their_outcome() -> None:
     own = AirHockeyEnv("prepare", max_episode_steps=30, profile="evaluation")
     for episode in range(3):
         seed = {"seed": 5} if episode == 0 else {}
-        steps, info = played_to_the_end(limited, **seed)
-        own_steps, own_info = played_to_the_end(own, **seed)
+        steps, info = play_to_the_end(limited, **seed)
+        own_steps, own_info = play_to_the_end(own, **seed)
         assert (steps, info["end"], info["success"]) == (own_steps, own_info["end"], own_info["success"])
         assert info["steps"] == 30
     assert limited.unwrapped.save().episode_number == 2
@@ -305,15 +306,15 @@ def test_time_limit_of_make_ends_episodes_with_their_outcome() -> None:
 def test_time_limit_added_later_keeps_the_seed() -> None:
     env = AirHockeyEnv("prepare")
     env.reset(seed=5)
-    steps, info = played_to_the_end(TimeLimit(env, 10))
+    steps, info = play_to_the_end(TimeLimit(env, 10))
     assert (steps, info["end"]) == (10, "horizon")
     assert env.reset()[1] == {"seed": 5, "episode_number": 2}
-    assert played_to_the_end(env)[0] > 10, "the limit is that of the wrapper"
+    assert play_to_the_end(env)[0] > 10, "the limit is that of the wrapper"
 
 
-def test_time_limit_around_other_wrappers_is_theirs() -> None:
+def test_time_limit_around_other_wrappers_counts_their_steps() -> None:
     env = TimeLimit(MaxAndSkipObservation(AirHockeyEnv("prepare"), skip=4), 50)
-    steps, info = played_to_the_end(env, seed=5)
+    steps, info = play_to_the_end(env, seed=5)
     assert steps == 50
 
 
@@ -367,7 +368,7 @@ def test_spec_makes_the_same_environment() -> None:
     env = gymnasium.make("faceoff/AirHockey-Prepare-v0", max_episode_steps=30, profile="evaluation")
     assert env.spec is not None
     twin = gymnasium.make(gymnasium.envs.registration.EnvSpec.from_json(env.spec.to_json()))
-    first, other = played_to_the_end(env, seed=2), played_to_the_end(twin, seed=2)
+    first, other = play_to_the_end(env, seed=2), play_to_the_end(twin, seed=2)
     assert (first[0], first[1]["end"]) == (other[0], other[1]["end"]) == (30, "horizon")
 
 

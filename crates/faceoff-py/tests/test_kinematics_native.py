@@ -177,7 +177,7 @@ def test_points_have_the_same_bits_alone_and_in_a_batch() -> None:
 
 
 def layouts(array: np.ndarray) -> list[Any]:
-    """The same constants, shape (n, m), in different memory layouts and types."""
+    """The same numbers, shape (n, m), in different memory layouts and types."""
     wide = np.zeros((2 * len(array), array.shape[1] + 3))
     wide[::2, 1:-2] = array
     bytewise = np.zeros(array.nbytes + 1, np.uint8)
@@ -327,13 +327,13 @@ def test_compiled_half_refuses_unsuitable_arrays() -> None:
 
 def test_mallet_commands_agree_between_both_inverses() -> None:
     draws = np.random.default_rng(8)
-    numpy_result, native_motion = MalletMotion(16, 2.0), MalletMotion(16, 2.0, native.inverse)
+    numpy_motion, native_motion = MalletMotion(16, 2.0), MalletMotion(16, 2.0, native.inverse)
     single = MalletMotion(1, 2.0, native.inverse)
     for step in range(300):
         if step % 10 == 0:
             actions = draws.choice([-1.0, 0.0, 0.5, 1.0], (16, 2))
         commands = native_motion.command(actions)
-        np.testing.assert_allclose(commands, numpy_result.command(actions), rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(commands, numpy_motion.command(actions), rtol=0.0, atol=1e-9)
         np.testing.assert_array_equal(commands[3:4], single.command(actions[3:4]))
     assert np.ptp(native_motion.xy, axis=0).min() > 0.3, "the mallets have moved"
 

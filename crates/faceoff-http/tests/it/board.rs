@@ -245,7 +245,7 @@ async fn evaluation_page_shows_results_violations_and_times() {
     }
     let facts = texts(&html, ".facts").join(" ");
     for part in [
-        "Longest delay caused by our machine30 ms",
+        "Longest delay caused by the server’s machine30 ms",
         "Episodes repeated because of it2",
         "Restarts after a platform fault1",
     ] {

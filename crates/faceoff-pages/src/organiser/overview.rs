@@ -275,7 +275,7 @@ async fn failures(app: &App, day: StageDay) -> Result<Vec<Item>, Problem> {
             links: vec![
                 (
                     format!("/organiser/decide/rerun/{}", view.id),
-                    "Repeat the evaluation".into(),
+                    "Rerun the evaluation".into(),
                 ),
                 (
                     format!("/organiser/day?stage={}&day={}", day.stage, day.date),

@@ -34,7 +34,7 @@ pub enum ProposalKind {
     /// Repeats all counting evaluations of a day, on the same episodes.
     Day(Date),
     /// Repeats all counting evaluations of a day, on the same episodes, under the newest revision of the stage's rules.
-    Rules(Date),
+    DayWithNewestRules(Date),
 }
 
 impl ProposalKind {

@@ -343,7 +343,7 @@ fn sandbox_page_has_the_default_limits() {
             mebibytes(bundle.unpacked_bytes)
         ),
         format!(
-            "| log that is kept (standard error) | the last {} KiB |",
+            "| log that is kept (standard error) | its beginning and its end, {} KiB together |",
             limits.stderr_kept_bytes >> 10
         ),
         format!("| start, until `ready` | {} s |", time.startup_s),

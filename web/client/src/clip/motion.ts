@@ -79,7 +79,7 @@ export interface Motion {
   readonly arms: readonly ArmMotion[];
   readonly contacts: readonly Contact[];
   readonly violations: readonly Violation[];
-  readonly breaks: readonly RallyEnd[];
+  readonly rallyEnds: readonly RallyEnd[];
   /** Score at the first sample of a game clip, if recorded. */
   readonly score: readonly [number, number] | null;
   readonly end: EpisodeEnd | null;
@@ -133,7 +133,7 @@ export function decodeMotion(bytes: Uint8Array): Motion {
       to: v.integer("to", 0, Number.MAX_SAFE_INTEGER),
       worst: v.number("worst"),
     })),
-    breaks: header.objects("breaks").map((b) => ({
+    rallyEnds: header.objects("breaks").map((b) => ({
       sample: b.integer("sample", 0, Number.MAX_SAFE_INTEGER),
       what: b.text("what"),
       by: b.has("by") ? sideOf(b, "by") : null,

@@ -24,7 +24,7 @@ export interface Observed {
   /** Commanded angles of the seven joints, rad. */
   readonly command: readonly Float64Array[] | null;
   readonly computationTimeS: Float64Array | null;
-  /** The part of the computation time that the server caused. */
+  /** Host interference: the part of the wall time that other load caused, which `computationTimeS` does not include. */
   readonly hostTimeS: Float64Array | null;
   /** Samples with a late answer. */
   readonly late: readonly number[];

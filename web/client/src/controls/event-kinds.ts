@@ -1,7 +1,7 @@
 // Switches for the kinds of events on the time line and in the list.
 
 import { EVENT_KINDS, type SwitchedKind } from "../replay/fragment";
-import { KINDS_OF_PARTS } from "../replay/course";
+import { PART_ONLY_KINDS } from "../replay/course";
 import type { EventFilter, ReplayEvent } from "../replay/events";
 import { h } from "./dom";
 
@@ -9,7 +9,7 @@ const NAMES: Record<SwitchedKind, string> = {
   goal: "Goals",
   foul: "Fouls",
   rally: "Other ends of rallies",
-  violation: "Broken limits",
+  violation: "Violations",
   contact: "Contacts",
   lost: "Puck not seen",
   late: "Late answers",
@@ -29,8 +29,8 @@ export class EventKinds {
     isGame: boolean,
     private readonly changed: () => void,
   ) {
-    // In a game they are off until the visitor switches them on.
-    this.initial = isGame ? KINDS_OF_PARTS : [];
+    // In a game, kinds that are known only of loaded parts are off until the visitor switches them on.
+    this.initial = isGame ? PART_ONLY_KINDS : [];
     this.hidden = new Set(this.initial);
     for (const kind of EVENT_KINDS) {
       const box = h("input", { attributes: { type: "checkbox" } });

@@ -96,12 +96,12 @@ export class Timeline {
     if (this.last <= 0) return;
     const share = (position: number): string =>
       `${(100 * Math.min(Math.max(position / this.last, 0), 1)).toFixed(3)}%`;
-    const numbers = new Map<string, number>();
-    for (const { kind } of this.events) numbers.set(kind, (numbers.get(kind) ?? 0) + 1);
+    const countByKind = new Map<string, number>();
+    for (const { kind } of this.events) countByKind.set(kind, (countByKind.get(kind) ?? 0) + 1);
     const spans: HTMLElement[] = [];
     this.buttons = [];
     for (const event of this.events) {
-      const isBar = (numbers.get(event.kind) ?? 0) > MAX_BUTTONS_OF_KIND;
+      const isBar = (countByKind.get(event.kind) ?? 0) > MAX_BUTTONS_OF_KIND;
       if (isBar || event.endPosition > event.position) {
         const span = h("span", { class: `span ${event.kind}` });
         span.style.left = share(event.position);

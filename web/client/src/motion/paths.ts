@@ -59,63 +59,63 @@ function firstIndexFrom(sorted: Float64Array, value: number): number {
 
 function puckPath(motion: Motion, interpolation: Interpolation): Path {
   const last = motion.first + motion.samples - 1;
-  const at: number[] = motion.contacts
+  const positions: number[] = motion.contacts
     .map((contact) => contact.t / motion.stepS)
     .filter((position) => position > motion.first && position < last);
   for (let k = 0; k < motion.samples; k++) {
     for (let i = 0; i < (k < motion.samples - 1 ? PUCK_POINTS_PER_STEP : 1); i++)
-      at.push(motion.first + k + i / PUCK_POINTS_PER_STEP);
+      positions.push(motion.first + k + i / PUCK_POINTS_PER_STEP);
   }
-  at.sort((a, b) => a - b);
-  const ends = new Set(motion.breaks.map((end) => end.sample));
-  const places = new Float32Array(3 * at.length);
-  const gap = new Uint8Array(at.length);
+  positions.sort((a, b) => a - b);
+  const ends = new Set(motion.rallyEnds.map((end) => end.sample));
+  const points = new Float32Array(3 * positions.length);
+  const gaps = new Uint8Array(positions.length);
   const pose = newPose();
-  at.forEach((position, i) => {
+  positions.forEach((position, i) => {
     interpolation.poseAt(position, pose);
-    places.set([pose.x, pose.y, PUCK_LINE_Z_M], 3 * i);
-    if (ends.has(Math.floor(position))) gap[i] = 1;
+    points.set([pose.x, pose.y, PUCK_LINE_Z_M], 3 * i);
+    if (ends.has(Math.floor(position))) gaps[i] = 1;
   });
-  return { positions: Float64Array.from(at), points: places, gaps: gap };
+  return { positions: Float64Array.from(positions), points, gaps };
 }
 
 /** Points at quarter steps, so that the line ends at the mallet also between samples. */
 function malletPath(motion: Motion, interpolation: Interpolation, side: 0 | 1): Path {
   const count = (motion.samples - 1) * MALLET_POINTS_PER_STEP + 1;
-  const at = new Float64Array(count);
-  const places = new Float32Array(3 * count);
-  const gap = new Uint8Array(count);
-  const ends = new Set(motion.breaks.map((end) => end.sample));
+  const positions = new Float64Array(count);
+  const points = new Float32Array(3 * count);
+  const gaps = new Uint8Array(count);
+  const ends = new Set(motion.rallyEnds.map((end) => end.sample));
   const arm = new Kinematics(side);
   const pose = newPose();
   for (let i = 0; i < count; i++) {
-    at[i] = motion.first + i / MALLET_POINTS_PER_STEP;
-    interpolation.poseAt(at[i], pose);
+    positions[i] = motion.first + i / MALLET_POINTS_PER_STEP;
+    interpolation.poseAt(positions[i], pose);
     arm.set(pose.arms[side].q);
-    places.set(arm.endEffector.subarray(9, 12), 3 * i);
-    if (ends.has(Math.floor(at[i]))) gap[i] = 1;
+    points.set(arm.endEffector.subarray(9, 12), 3 * i);
+    if (ends.has(Math.floor(positions[i]))) gaps[i] = 1;
   }
-  return { positions: at, points: places, gaps: gap };
+  return { positions, points, gaps };
 }
 
 function commandedPath(observed: Observed, command: readonly Float64Array[]): Path {
   const { first, samples, side } = observed;
-  const at = new Float64Array(samples);
-  const places = new Float32Array(3 * samples);
-  const gap = new Uint8Array(samples);
+  const positions = new Float64Array(samples);
+  const points = new Float32Array(3 * samples);
+  const gaps = new Uint8Array(samples);
   const arm = new Kinematics(side);
   const q = new Float64Array(JOINT_COUNT);
   for (let k = 0; k < samples; k++) {
-    at[k] = first + k;
+    positions[k] = first + k;
     for (let i = 0; i < JOINT_COUNT; i++) q[i] = command[i][k];
     if (Number.isNaN(q[0])) {
       // No command for this sample: no line to it or from it.
-      gap[k] = 1;
-      if (k > 0) gap[k - 1] = 1;
+      gaps[k] = 1;
+      if (k > 0) gaps[k - 1] = 1;
       continue;
     }
     arm.set(q);
-    places.set(arm.endEffector.subarray(9, 12), 3 * k);
+    points.set(arm.endEffector.subarray(9, 12), 3 * k);
   }
-  return { positions: at, points: places, gaps: gap };
+  return { positions, points, gaps };
 }

@@ -42,7 +42,7 @@ export class Interpolation {
       if (interval >= 0 && interval < intervals && this.firstContact[interval] < 0)
         this.firstContact[interval] = i;
     });
-    for (const end of motion.breaks) {
+    for (const end of motion.rallyEnds) {
       const interval = end.sample - motion.first;
       if (interval >= 0 && interval < intervals) this.isRallyEnd[interval] = 1;
     }

@@ -20,7 +20,7 @@ export interface Course {
 }
 
 /** Kinds of events that a course does not have: they are known only of the parts that are loaded. */
-export const KINDS_OF_PARTS: readonly SwitchedKind[] = ["contact", "lost", "late"];
+export const PART_ONLY_KINDS: readonly SwitchedKind[] = ["contact", "lost", "late"];
 
 const GROUPS = Object.keys(CONSTRAINT_NAMES) as ConstraintGroup[];
 
@@ -68,7 +68,7 @@ export function courseEvents(course: Course, names: SideNames): ReplayEvent[] {
 
 /** Does a course have all kinds of events that are shown? */
 export function courseHas(shows: EventFilter): boolean {
-  return !KINDS_OF_PARTS.some((kind) => shows({ kind }));
+  return !PART_ONLY_KINDS.some((kind) => shows({ kind }));
 }
 
 /** The score at a position. The sample of a rally's end still belongs to the rally. */

@@ -84,7 +84,7 @@ export function eventsOf(motion: Motion, observed: Observed | null, names: SideN
     const side = isGame ? violation.side : null;
     add("violation", violation.from, violation.to, prefix + violationText(violation), side);
   }
-  events.push(...rallyEvents(motion.breaks, names, motion.score ?? (motion.first === 0 ? [0, 0] : null)));
+  events.push(...rallyEvents(motion.rallyEnds, names, motion.score ?? (motion.first === 0 ? [0, 0] : null)));
   for (const lost of observed?.lost ?? []) {
     add("lost", lost.from, lost.to, `camera lost the puck for ${lost.to - lost.from + 1} steps`);
   }

@@ -40,7 +40,7 @@ export interface FrameState {
   ghost: FrameState | null;
 }
 
-/** How puck and arm are drawn: as in the replay of the table, or as those of another replay, through which the first are seen. */
+/** How puck and arm are drawn: solid, or translucent (a ghost) for a second replay on the same table. */
 export type Look = "solid" | "ghost";
 
 /** A renderer of table, puck and arms. */

@@ -18,7 +18,8 @@ const SAVED_RATIO = 2;
 export interface PictureTexts {
   readonly state: string;
   readonly outcome: string;
-  readonly good: boolean;
+  /** Is the outcome a success? */
+  readonly isSuccess: boolean;
   /** Score of a game. */
   readonly score: readonly [number, number] | null;
 }
@@ -133,7 +134,7 @@ export class Picture {
   setTexts(texts: PictureTexts): void {
     showText(this.state, texts.state);
     showText(this.outcome, texts.outcome);
-    this.outcome.classList.toggle("good", texts.good);
+    this.outcome.classList.toggle("good", texts.isSuccess);
     if (texts.score !== null) setText(this.points, `${texts.score[0]} : ${texts.score[1]}`);
     this.score.hidden = texts.score === null;
   }

@@ -10,11 +10,11 @@ type GameScore = readonly [number, number];
  * start score needs all chunks before it.
  */
 export class Score {
-  private readonly chunks = new Map<number, { breaks: readonly RallyEnd[]; start: GameScore | null }>();
+  private readonly chunks = new Map<number, { rallyEnds: readonly RallyEnd[]; start: GameScore | null }>();
 
   /** Adds a loaded chunk with its ends of rallies and the score at its start, if recorded. */
-  addChunk(chunk: number, breaks: readonly RallyEnd[], start: GameScore | null): void {
-    this.chunks.set(chunk, { breaks, start });
+  addChunk(chunk: number, rallyEnds: readonly RallyEnd[], start: GameScore | null): void {
+    this.chunks.set(chunk, { rallyEnds, start });
   }
 
   at(position: number): GameScore | null {
@@ -23,7 +23,7 @@ export class Score {
       // The last sample of the game does not start another chunk.
       if (chunk === undefined && position === i * CHUNK_STEPS) continue;
       if (chunk === undefined) return null;
-      const last = chunk.breaks.findLast((end) => end.score !== null && end.sample < position);
+      const last = chunk.rallyEnds.findLast((end) => end.score !== null && end.sample < position);
       if (last !== undefined) return last.score;
       if (chunk.start !== null) return chunk.start;
     }

@@ -3,8 +3,8 @@
 import type { EventFilter, ReplayEvent } from "./events";
 import type { Source } from "./source";
 
-/** Where an event is searched. */
-export interface Searched {
+/** The start, direction and filter of a search for an event. */
+export interface EventQuery {
   readonly from: number;
   readonly direction: 1 | -1;
   readonly shows: EventFilter;
@@ -13,7 +13,7 @@ export interface Searched {
 /** The nearest of some events, which are in order of time. */
 export function nearestOf(
   events: readonly ReplayEvent[],
-  { from, direction, shows }: Searched,
+  { from, direction, shows }: EventQuery,
 ): ReplayEvent | null {
   const isFound = (event: ReplayEvent): boolean =>
     shows(event) && (direction === 1 ? event.position > from + 1e-4 : event.position < from - 1e-4);
@@ -25,14 +25,14 @@ export async function nearestInParts(
   source: Pick<Source, "indexOf" | "startOf">,
   knownEvents: () => readonly ReplayEvent[],
   load: (index: number, start: number) => Promise<void>,
-  searched: Searched,
+  query: EventQuery,
 ): Promise<ReplayEvent | null> {
-  const { from, direction } = searched;
+  const { from, direction } = query;
   for (let index = source.indexOf(from); ; index += direction) {
     const start = source.startOf(index);
-    if (start === null) return nearestOf(knownEvents(), searched);
+    if (start === null) return nearestOf(knownEvents(), query);
     await load(index, start);
-    const found = nearestOf(knownEvents(), searched);
+    const found = nearestOf(knownEvents(), query);
     // Before a known event of a later part, parts that are not loaded may have a nearer one.
     if (found !== null && (source.indexOf(found.position) - index) * direction <= 0) return found;
   }

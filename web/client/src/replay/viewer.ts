@@ -48,7 +48,7 @@ export interface ViewerOptions {
 }
 
 /** What a viewer reports to its player. */
-export interface ViewerEvents {
+export interface ViewerCallbacks {
   readonly announce: (text: string) => void;
   readonly clicked: () => void;
   readonly viewSwitched: () => void;
@@ -96,7 +96,7 @@ export class Viewer {
 
   constructor(
     private readonly options: ViewerOptions,
-    private readonly events: ViewerEvents,
+    private readonly callbacks: ViewerCallbacks,
   ) {
     const { clock, title, section, names } = options;
     this.courseEvents = options.course === null ? [] : courseEvents(options.course, names);
@@ -106,7 +106,7 @@ export class Viewer {
       prefersReducedMotion: options.prefersReducedMotion,
       changed: this.invalidate,
       switched: () => { this.viewSwitched(); },
-      clicked: events.clicked,
+      clicked: callbacks.clicked,
     }); // prettier-ignore
     const seek = (position: number): void => {
       clock.pause();
@@ -150,7 +150,7 @@ export class Viewer {
         h("p", {}, `The replay could not be loaded: ${errorText(error)}.`),
         button("Try again", () => {
           failure.remove();
-          this.events.openAgain();
+          this.callbacks.openAgain();
         }),
       );
       this.insertBelowStill(failure);
@@ -181,12 +181,12 @@ export class Viewer {
   /** The nearest event in a direction; searches further parts of a game if necessary. */
   async findEvent(from: number, direction: 1 | -1, shows: EventFilter): Promise<ReplayEvent | null> {
     const { source } = this.options;
-    const searched = { from, direction, shows };
-    if (this.isInCourse(shows)) return nearestOf(this.allEvents(), searched);
+    const query = { from, direction, shows };
+    if (this.isInCourse(shows)) return nearestOf(this.allEvents(), query);
     const load = async (index: number, start: number): Promise<void> => {
       if (!this.partEvents.has(index)) this.addPart(await source.partAt(start));
     };
-    return nearestInParts(source, () => this.allEvents(), load, searched);
+    return nearestInParts(source, () => this.allEvents(), load, query);
   }
 
   /** Are all events of the shown kinds in the course of the game? */
@@ -275,8 +275,8 @@ export class Viewer {
       part.index,
       events.filter((event) => !isInCourse(event)),
     );
-    this.score.addChunk(part.index, part.motion.breaks, part.motion.score);
-    this.events.eventsChanged();
+    this.score.addChunk(part.index, part.motion.rallyEnds, part.motion.score);
+    this.callbacks.eventsChanged();
   }
 
   /** Shows a part. */
@@ -296,7 +296,7 @@ export class Viewer {
     this.frame.part = part;
     this.strips.show(part);
     this.dataTable.show(part);
-    this.events.partShown(part);
+    this.callbacks.partShown(part);
     section.dataset.state = "ready";
     if (part.observationError !== null) {
       this.problem.classList.add("minor");
@@ -319,7 +319,12 @@ export class Viewer {
     if (this.loadingIndex === index) return false;
     this.loadingIndex = index;
     section.dataset.state = "loading";
-    this.picture.setTexts({ state: "Loading …", outcome: "", good: false, score: this.scoreAt(clamped) });
+    this.picture.setTexts({
+      state: "Loading …",
+      outcome: "",
+      isSuccess: false,
+      score: this.scoreAt(clamped),
+    });
     source.partAt(clamped).then(
       (part) => {
         this.addPart(part);
@@ -331,7 +336,7 @@ export class Viewer {
         if (this.loadingIndex !== index) return;
         this.options.clock.pause();
         section.dataset.state = "failed";
-        this.picture.setTexts({ state: "Not loaded", outcome: "", good: false, score: null });
+        this.picture.setTexts({ state: "Not loaded", outcome: "", isSuccess: false, score: null });
         this.problem.classList.remove("minor");
         this.problem.replaceChildren(
           h("p", {}, `This part of the replay could not be loaded: ${errorText(error)}.`),
@@ -372,7 +377,7 @@ export class Viewer {
     const moving = !this.picture.isFlat && orbit?.tick(nowMs, frame.pose) === true;
     const calls = this.isGhost ? 0 : this.picture.draw(frame);
     this.updateValues(frame, step, nowMs);
-    this.events.drawn();
+    this.callbacks.drawn();
     setData(section, "step", String(step));
     setData(section, "drawCalls", String(calls));
     section.dataset.state = "ready";
@@ -429,7 +434,7 @@ export class Viewer {
     this.picture.setTexts({
       state: this.last === 0 ? "No steps" : frame.isPuckLost ? "○ Puck not seen by the camera" : "",
       outcome: hasEnded ? symbol + this.motionEnd : "",
-      good: motion.end?.success === true,
+      isSuccess: motion.end?.success === true,
       score: motion.contest === "game" ? this.scoreAt(frame.position) : null,
     });
     this.step = step;
@@ -453,8 +458,8 @@ export class Viewer {
     const picture = this.picture as Picture | undefined;
     if (picture === undefined) return;
     section.dataset.view = picture.isFlat ? "flat" : "3d";
-    if (this.frame !== null && picture.unavailable !== null) this.events.announce(picture.unavailable);
-    this.events.viewSwitched();
+    if (this.frame !== null && picture.unavailable !== null) this.callbacks.announce(picture.unavailable);
+    this.callbacks.viewSwitched();
     this.invalidate();
   }
 }

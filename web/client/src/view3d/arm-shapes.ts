@@ -4,7 +4,7 @@
 import { MODEL } from "../model/model";
 import type { Look } from "../replay/frame-state";
 import type { Paint, Piece } from "./coloured-geometry";
-import { ball, drum, limb, turned } from "./shapes";
+import { ball, drum, latheShape, limb } from "./shapes";
 
 /** Indices of the rigid bodies of an arm: base, links 1 to 7, mallet. */
 export const BASE_BODY = 0;
@@ -35,7 +35,7 @@ const WAISTS_M = [0.092, 0.08, 0.077, 0.069, 0.059, 0.06];
 const FLANGE_LENGTH_M = 0.05;
 const ROD_RADIUS_M = 0.0125;
 
-/** All pieces of an arm; `floor_z_m`: height of the floor in the table frame. */
+/** All pieces of an arm; `floorZ`: height of the floor in the table frame, m. */
 export function armPieces(side: 0 | 1, floorZ: number, look: Look): Piece[] {
   const paint = look === "ghost" ? GHOST_PAINT : PAINT[side];
   // A ghost has its base in common with the arm of the table.
@@ -58,7 +58,7 @@ function basePieces(paint: ArmPaint, floor: number): Piece[] {
     },
     { geometry: drum(0.15, -0.012, 0.016, 0.006), paint: ["rp-rim", "black", 0.2], body },
     {
-      geometry: turned([
+      geometry: latheShape([
         [0.136, 0.016],
         [0.134, 0.024],
         [0.126, 0.036],
@@ -131,7 +131,7 @@ function malletPieces(paint: ArmPaint): Piece[] {
   const top = centre - half;
   return [
     {
-      geometry: turned(
+      geometry: latheShape(
         [
           [0.012, 0],
           [0.019, 0.004],

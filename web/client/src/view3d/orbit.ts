@@ -64,7 +64,7 @@ export class Orbit implements CameraPosition {
   restore(position: CameraPosition): void {
     this.camera = null;
     this.isOfLink = true;
-    this.animateTo(this.turned(position, 0, 0, 1));
+    this.animateTo(this.movedPosition(position, 0, 0, 1));
   }
 
   /** Fits the picture to another shape or number of arms, at once. */
@@ -78,7 +78,7 @@ export class Orbit implements CameraPosition {
     this.arms = arms;
     this.animationStart = null;
     if (this.camera === null || this.isByHand) {
-      this.target = this.turned(this.target, 0, 0, factor);
+      this.target = this.movedPosition(this.target, 0, 0, factor);
     } else {
       const position = cameraPosition(this.camera, arms, field);
       const { x, y } = this;
@@ -89,18 +89,18 @@ export class Orbit implements CameraPosition {
 
   turn(right: number, up: number): void {
     this.leavePreset();
-    this.animateTo(this.turned(this.target, right * TURN_STEP_RAD, up * TURN_STEP_RAD, 1));
+    this.animateTo(this.movedPosition(this.target, right * TURN_STEP_RAD, up * TURN_STEP_RAD, 1));
   }
 
   zoom(steps: number): void {
     this.leavePreset();
-    this.animateTo(this.turned(this.target, 0, 0, ZOOM_FACTOR ** steps));
+    this.animateTo(this.movedPosition(this.target, 0, 0, ZOOM_FACTOR ** steps));
   }
 
   /** Turns by pointer movement in pixels, without animation. */
   drag(dx: number, dy: number): void {
     this.leavePreset();
-    this.jumpTo(this.turned(this, -dx * RADIANS_PER_PIXEL, dy * RADIANS_PER_PIXEL, 1));
+    this.jumpTo(this.movedPosition(this, -dx * RADIANS_PER_PIXEL, dy * RADIANS_PER_PIXEL, 1));
   }
 
   /**
@@ -109,7 +109,7 @@ export class Orbit implements CameraPosition {
    */
   pinch(dx: number, dy: number, angle: number, factor: number, height: number): void {
     const metresPerPixel = (2 * this.distance * this.field.tanY) / height;
-    const position = this.turned(this, angle, 0, 1 / factor);
+    const position = this.movedPosition(this, angle, 0, 1 / factor);
     this.leavePreset();
     const { right, back } = cameraAxes(this.azimuth, 0);
     // Seen flatly, a pixel covers more of the table, up to three times.
@@ -189,19 +189,20 @@ export class Orbit implements CameraPosition {
     this.changed();
   }
 
-  private turned(
+  /** A camera position after a turn by two angles (rad) and a change of the distance by a factor, within the camera's ranges. */
+  private movedPosition(
     position: CameraPosition,
-    azimuth: number,
-    elevation: number,
-    distance: number,
+    azimuthChange: number,
+    elevationChange: number,
+    distanceFactor: number,
   ): CameraPosition {
     return {
       x: position.x,
       y: position.y,
       z: position.z,
-      azimuth: position.azimuth + azimuth,
-      elevation: clamp(position.elevation + elevation, ELEVATION_RANGE_RAD),
-      distance: clamp(position.distance * distance, DISTANCE_RANGE_M),
+      azimuth: position.azimuth + azimuthChange,
+      elevation: clamp(position.elevation + elevationChange, ELEVATION_RANGE_RAD),
+      distance: clamp(position.distance * distanceFactor, DISTANCE_RANGE_M),
     };
   }
 

@@ -16,7 +16,7 @@ export type ProfilePoint = readonly [radius: number, along: number];
 const ROUND_STEPS = 3;
 
 /** A shape about z from its profile, which runs from low to high z. */
-export function turned(profile: readonly ProfilePoint[], sides = 24): BufferGeometry {
+export function latheShape(profile: readonly ProfilePoint[], sides = 24): BufferGeometry {
   // The lathe rotates about y; rotate the axis to z.
   const points = profile.map(([radius, along]) => new Vector2(radius, along));
   return new LatheGeometry(points, sides).rotateX(Math.PI / 2);
@@ -41,7 +41,7 @@ export function drum(
     profile.push([toRadius - round + round * Math.cos(angle), to - round + round * Math.sin(angle)]);
   }
   profile.push([0, to]);
-  return turned(profile, sides);
+  return latheShape(profile, sides);
 }
 
 /**
@@ -67,7 +67,7 @@ export function limb(length: number, fromRadius: number, waist: number, toRadius
     const angle = (i / 6) * (Math.PI / 2);
     profile.push([toRadius * Math.cos(angle), length + toRadius * Math.sin(angle)]);
   }
-  return turned(profile);
+  return latheShape(profile);
 }
 
 export function ball(radius: number): BufferGeometry {

@@ -50,7 +50,7 @@ const LINE: Paint = ["rp-mark", "rp-rim", 0.25];
 export class TableModel {
   readonly group = new Group();
   private readonly table: ColouredGeometry;
-  private readonly region = new MeshBasicMaterial({
+  private readonly regionMaterial = new MeshBasicMaterial({
     transparent: true,
     opacity: 0.1,
     depthWrite: false,
@@ -69,14 +69,14 @@ export class TableModel {
     table.receiveShadow = true;
     this.group.add(table);
 
-    const place = successRegion(contest);
-    if (place !== null) {
-      const field = new Mesh(
-        new PlaneGeometry(place.x_to_m - place.x_from_m, 2 * place.half_width_m),
-        this.region,
+    const region = successRegion(contest);
+    if (region !== null) {
+      const mesh = new Mesh(
+        new PlaneGeometry(region.x_to_m - region.x_from_m, 2 * region.half_width_m),
+        this.regionMaterial,
       );
-      field.position.set((place.x_from_m + place.x_to_m) / 2, 0, 0.0006);
-      this.group.add(field);
+      mesh.position.set((region.x_from_m + region.x_to_m) / 2, 0, 0.0006);
+      this.group.add(mesh);
     }
     for (const object of [this.group, ...this.group.children]) {
       object.updateMatrix();
@@ -85,7 +85,7 @@ export class TableModel {
   }
 
   paint(palette: Palette): void {
-    this.region.color.set(palette.good);
+    this.regionMaterial.color.set(palette.good);
     this.table.paint(palette);
   }
 }

@@ -71,11 +71,11 @@ impl EvaluationDecision {
             Self::Rerun(id) => {
                 let view = evaluation(app, id).await?;
                 Ok(DecisionPreview {
-                    title: format!("Repeat {}’s evaluation of {}", view.team_name, view.day),
+                    title: format!("Rerun {}’s evaluation of {}", view.team_name, view.day),
                     effects: "The submission that was active at the cutoff will be evaluated again on the same episodes. The \
                               new evaluation will replace this one."
                         .to_owned(),
-                    button: "Repeat the evaluation",
+                    button: "Rerun the evaluation",
                     ..DecisionPreview::new(day_page(day_of(&view)))
                 })
             }

@@ -37,8 +37,9 @@ from faceoff.challenge_2023 import play
 if __name__ == "__main__":
     play(Path(__file__).parent)
 '''
-# The limit of the server for a name on the board.
-_NAME_LENGTH_MAX = 64
+# The evaluator's limits on the name and the runtime of an agent, characters.
+_NAME_LENGTH_MAX = 60
+_RUNTIME_LENGTH_MAX = 40
 
 
 def make_bundle(folder: str | Path, bundle: str | Path, *, name: str | None = None, runtime: str = RUNTIME) -> None:
@@ -56,7 +57,7 @@ def make_bundle(folder: str | Path, bundle: str | Path, *, name: str | None = No
         path_of(key, value, "a folder").absolute() for key, value in (("folder", folder), ("bundle", bundle))
     )
     title = _text("name", target.name if name is None else name, _NAME_LENGTH_MAX)
-    _text("runtime", runtime, _NAME_LENGTH_MAX)
+    _text("runtime", runtime, _RUNTIME_LENGTH_MAX)
     package = _find_package(source)
     _check_builder(package / "agent_builder.py")
     if target.exists() or target.is_symlink():

@@ -100,7 +100,7 @@ class Dataset:
 
     @cached_property
     def log(self) -> str:
-        """The end of the agent's standard error, with its faults."""
+        """The beginning and the end of the agent's standard error, with its faults."""
         return self._container.bytes("agent.log").decode(errors="replace")
 
     def check(self) -> None:

@@ -268,8 +268,9 @@ def find_time_limit(env: AirHockeyEnv) -> int | None:
     """The number of steps of the ``TimeLimit`` of ``gymnasium.make`` around this environment, whose ``reset`` is under way.
 
     ``make(max_episode_steps=…)`` does not hand its argument to the environment, but wraps it. The environment must
-    know the limit, because the last step's info says how the episode ended. A wrapper around it is a caller of this call.
-    A limit around other wrappers is none of the environment's: they may repeat actions.
+    know the limit, because the last step's info says how the episode ended. The wrapper calls this environment's
+    ``reset``, so it is found among the callers. A limit outside of other wrappers does not apply here: those wrappers
+    may repeat actions.
     """
     frame = sys._getframe(1)
     while frame is not None:

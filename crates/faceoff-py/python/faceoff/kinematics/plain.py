@@ -109,9 +109,9 @@ def inverse(
 ) -> tuple[list[float], bool]:
     """Joint positions (rad) that put the end effector at a point, and whether they do so within all bounds.
 
-    `target` is x, y at the mallet's height, or x, y, z; m. `q0` (rad) is the start pose; see the module's text.
-    Bounds are 95 % of the joints' range and the minimum height of elbow and wrist, with a margin. If the flag is
-    false, the pose is the nearest that was found; do not command it without a check.
+    `target` is x, y at the mallet's height, or x, y, z; m. `q0` (rad) is the pose from which the search starts; see
+    the module's text. Bounds are 95 % of the joints' range and the minimum height of elbow and wrist, with a margin.
+    If the flag is false, the pose is the nearest that was found; do not command it without a check.
     """
     point = _point(target)
     if q0 is None:

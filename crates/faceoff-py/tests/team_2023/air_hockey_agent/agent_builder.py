@@ -16,7 +16,7 @@ def build_agent(env_info, **kwargs):
 
 
 class Follower(AgentBase):
-    """Keeps the mallet in front of the goal, at the puck's side of it."""
+    """Keeps the mallet in front of its own goal, at the puck's y."""
 
     def __init__(self, env_info, agent_id=1, distance=0.15, gain=1.0, **kwargs):
         super().__init__(env_info, agent_id, **kwargs)
