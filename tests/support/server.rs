@@ -62,7 +62,7 @@ pub struct Server {
     log: Log,
     /// `http://127.0.0.1:PORT`
     pub url: String,
-    /// The host's token, which has an organiser's rights.
+    /// The operator's token, which has an organiser's rights.
     pub admin_token: String,
     client: Client,
 }

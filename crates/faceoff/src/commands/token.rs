@@ -145,7 +145,7 @@ fn token_line(token: &TokenView, now: Timestamp) -> String {
     let owner = match (token.team, token.person) {
         (Some(id), _) => format!("team:{id}"),
         (None, Some(id)) => format!("person:{id}"),
-        // The host's token: it belongs to the operator, who has access to the server's data folder.
+        // The operator's token: the operator has access to the server's data folder.
         (None, None) => "host".to_owned(),
     };
     let last_use = token.last_used_at.map_or_else(
