@@ -7,7 +7,7 @@ pub enum ReplayError {
     #[error(transparent)]
     Io(#[from] std::io::Error),
     /// The data is invalid, too large, or from another version.
-    #[error("{what} cannot be read or written by this version: {why}")]
+    #[error("{what} is not a clip that this version supports: {why}")]
     Unreadable {
         /// The file or clip.
         what: String,

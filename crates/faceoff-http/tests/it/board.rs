@@ -158,7 +158,7 @@ async fn board_shows_only_score_and_points_before_the_release() {
     assert!(
         texts(&html, ".facts")
             .join(" ")
-            .contains("published together")
+            .contains("published when the day is released")
     );
     let tasks = page(&site, "/tasks/hit").await;
     assert_eq!(texts(&tasks, "td.none").len(), TEAMS.len());

@@ -931,10 +931,6 @@ async fn schedule_replay_has_new_seeds_and_does_not_count() {
         .rerun_game(Actor::Operator, game, f.now)
         .await
         .unwrap();
-    f.store
-        .rerun_game(Actor::Operator, game, f.now)
-        .await
-        .unwrap();
     let (claim, counting_game, _) = claim_game(&f).await;
     assert!(matches!(
         f.store.game(counting_game).await.unwrap().purpose,
