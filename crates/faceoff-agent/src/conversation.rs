@@ -79,7 +79,9 @@ enum Message {
     Hello(Hello),
     Reset { episode: u64 },
     Step { step: u64, obs: Observation },
+    /// The episode or rally has ended. It gets no answer.
     End {},
+    /// The session has ended.
     Bye {},
 }
 
