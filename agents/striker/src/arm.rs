@@ -261,13 +261,16 @@ impl Arm {
         let reach_in_plane = (reach * reach - outward * outward).max(0.0).sqrt();
         // … and the rest is a triangle between shoulder, elbow and tip. Angles from the vertical.
         let rise = self.height - SHOULDER_M;
-        let distance = reach_in_plane.hypot(rise).min(0.999 * (UPPER_ARM_M + link_length));
+        let distance = reach_in_plane
+            .hypot(rise)
+            .min(0.999 * (UPPER_ARM_M + link_length));
         let triangle_angle = |opposite: f64, a: f64, b: f64| {
             ((a * a + b * b - opposite * opposite) / (2.0 * a * b))
                 .clamp(-1.0, 1.0)
                 .acos()
         };
-        let shoulder = reach_in_plane.atan2(rise) - triangle_angle(link_length, UPPER_ARM_M, distance);
+        let shoulder =
+            reach_in_plane.atan2(rise) - triangle_angle(link_length, UPPER_ARM_M, distance);
         let elbow = triangle_angle(distance, UPPER_ARM_M, link_length);
         // The bent link leaves the elbow at `shoulder + π − elbow`, the forearm `bend` before that.
         let forearm = shoulder + std::f64::consts::PI - elbow - bend;

@@ -108,7 +108,9 @@ impl Absorb {
             .and_then(|plan| plan_with_cost(scene, plan.time - scene.time));
         let best = cheapest_interception(scene);
         self.interception = match (current, best) {
-            (Some((_, cost)), Some((better, least))) if least < cost - SWITCH_MARGIN => Some(better),
+            (Some((_, cost)), Some((better, least))) if least < cost - SWITCH_MARGIN => {
+                Some(better)
+            }
             (Some((kept, _)), _) => Some(kept),
             (None, best) => best.map(|(plan, _)| plan),
         };
@@ -159,7 +161,8 @@ fn cushioned_velocity(scene: &Scene<'_>) -> Option<Vec2> {
     let closing = (scene.puck.vel - scene.mallet.vel).dot(&normal);
     let puck_speed = scene.puck.vel.dot(&normal);
     let is_imminent = closing > 0.1 && gap > -0.01 && gap < CUSHION_TIME * closing;
-    (is_imminent && puck_speed > 0.0).then(|| retreat_speed(puck_speed, normal, scene.puck.pos) * normal)
+    (is_imminent && puck_speed > 0.0)
+        .then(|| retreat_speed(puck_speed, normal, scene.puck.pos) * normal)
 }
 
 /// The speed of the mallet along the puck's motion at contact. With restitution e, a mallet of speed w with (1 + e) w = e v stops a

@@ -185,7 +185,8 @@ fn run_up_room(field: &Field, contact: Vec2, direction: Vec2) -> f64 {
     };
     let y = field.mallet_y_max();
     let x = length_to_bound(contact.x, direction.x, field.mallet_x_min(), 0.0);
-    x.min(length_to_bound(contact.y, direction.y, -y, y)).clamp(0.0, 1.0)
+    x.min(length_to_bound(contact.y, direction.y, -y, y))
+        .clamp(0.0, 1.0)
 }
 
 /// A shot in `time_left` seconds that sends the puck to `aim` on the goal line. Without `speed` it is as fast as run-up and arm allow.
