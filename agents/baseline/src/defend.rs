@@ -38,10 +38,11 @@ impl Defend {
 
     /// The command for this control step.
     pub fn decide(&mut self, scene: &Scene<'_>) -> MalletCommand {
-        let valid_plan = self.interception.filter(|plan| {
+        // From the last correction until shortly after the contact the plan is fixed.
+        let fixed_plan = self.interception.filter(|plan| {
             plan.time - scene.time < LAST_CORRECTION && plan.time - scene.time > -0.06
         });
-        self.interception = valid_plan.or_else(|| find_crossing(scene));
+        self.interception = fixed_plan.or_else(|| find_crossing(scene));
         let Some(plan) = self.interception else {
             return guard(scene);
         };

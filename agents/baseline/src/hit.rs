@@ -3,7 +3,7 @@
 use striker::arm::Posture;
 use striker::field::Vec2;
 use striker::motion::{Pace, Target};
-use striker::scene::{MalletCommand, Scene, lean_side, waypoint};
+use striker::scene::{MalletCommand, Scene, elbow_side, waypoint};
 
 /// Speed of the mallet at the contact, m/s.
 const STRIKE_SPEED: f64 = 0.84;
@@ -25,9 +25,10 @@ enum Phase {
         contact_time: f64,
         /// Position of the mallet at contact.
         mallet: Vec2,
+        /// Velocity of the mallet at contact.
         velocity: Vec2,
     },
-    /// Comes to rest at `pos`.
+    /// Comes to rest at `pos` at the time `end_time`.
     Stop { end_time: f64, pos: Vec2 },
 }
 
@@ -67,7 +68,7 @@ impl Hit {
                     vel: Vec2::zeros(),
                     time: time_left.max(scene.dt),
                 };
-                MalletCommand::new(target, Posture::Ready(lean_side(pos)))
+                MalletCommand::new(target, Posture::Ready(elbow_side(pos)))
             }
         }
     }
@@ -75,8 +76,9 @@ impl Hit {
     fn approach(&mut self, scene: &Scene<'_>) -> MalletCommand {
         let field = scene.field;
         let goal = Vec2::new(field.half_length, 0.0);
-        // Position of the puck at contact if the run-up begins now.
+        // The mallet accelerates evenly from rest, so its mean speed in the run-up is half of the strike's.
         let run_up_time = 2.0 * RUN_UP_LENGTH / STRIKE_SPEED;
+        // The puck at contact if the run-up begins now.
         let mut puck = scene.puck;
         puck.advance(field, run_up_time);
         let direction = (goal - puck.pos).normalize();
@@ -91,7 +93,7 @@ impl Hit {
             };
         }
         let mut command = MalletCommand::stop(scene, next_point, Pace::QUICK);
-        command.posture = Posture::Ready(lean_side(start));
+        command.posture = Posture::Ready(elbow_side(start));
         command
     }
 
@@ -117,7 +119,7 @@ impl Hit {
                 vel: velocity,
                 time: time_left,
             },
-            Posture::Strike(lean_side(mallet)),
+            Posture::Strike(elbow_side(mallet)),
         );
         command.acceleration = STRIKE_ACCELERATION;
         command

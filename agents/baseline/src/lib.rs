@@ -1,9 +1,10 @@
 //! A rule-based opponent of about the strength of the 2023 challenge's baseline agent.
 //!
 //! The paper about that challenge describes its agent as typical approaches, planning and optimisation, that work well in the
-//! ideal simulator and badly elsewhere. This agent shares only that description: it predicts the puck, chooses
+//! ideal simulator and badly outside of it. This agent shares only that description: it predicts the puck, chooses
 //! a skill (defend, hit, prepare) by rules, plans one motion and carries it out without corrections. It does not have the
-//! strengths of [`striker`]: corrections of a running strike, the choice among many shots, and cushioning.
+//! strengths of [`striker`]: corrections of a running strike, the choice among many shots, and cushioning, which is a retreat of
+//! the mallet at contact that stops the puck.
 
 mod defend;
 mod guard;

@@ -33,13 +33,13 @@ enum Phase {
     Wait,
     /// Moves to the start of the run-up. `normal` points from mallet to puck at the contact; `puck` is the planned position.
     Approach { normal: Vec2, puck: Vec2 },
-    /// Pushes. Times are in seconds since the episode's start.
-    Run {
+    /// Accelerates to the contact, and brakes after it. Times are in seconds since the episode's start.
+    Push {
         normal: Vec2,
         mallet_at_contact: Vec2,
         contact_time: f64,
     },
-    /// Leaves the puck and watches it.
+    /// Returns to the front of the goal, and watches the puck until `end_time`.
     Retreat { end_time: f64 },
 }
 
@@ -55,7 +55,7 @@ impl Prepare {
 
     /// Whether a push is running that must not be interrupted.
     pub fn is_committed(&self) -> bool {
-        matches!(self.phase, Phase::Run { .. } | Phase::Retreat { .. })
+        matches!(self.phase, Phase::Push { .. } | Phase::Retreat { .. })
     }
 
     /// The command for this control step.
@@ -63,11 +63,11 @@ impl Prepare {
         match self.phase {
             Phase::Wait => self.wait(scene),
             Phase::Approach { normal, puck } => self.approach(scene, normal, puck),
-            Phase::Run {
+            Phase::Push {
                 normal,
                 mallet_at_contact,
                 contact_time,
-            } => self.run(scene, normal, mallet_at_contact, contact_time),
+            } => self.push(scene, normal, mallet_at_contact, contact_time),
             Phase::Retreat { end_time } => {
                 if scene.time > end_time {
                     self.phase = Phase::Wait;
@@ -104,7 +104,7 @@ impl Prepare {
             && (scene.mallet.pos - start).norm() < 0.012
             && scene.mallet.vel.norm() < 0.1
         {
-            self.phase = Phase::Run {
+            self.phase = Phase::Push {
                 normal,
                 mallet_at_contact: mallet,
                 contact_time: scene.time + RUN_UP_TIME,
@@ -122,7 +122,7 @@ impl Prepare {
         )
     }
 
-    fn run(
+    fn push(
         &mut self,
         scene: &Scene<'_>,
         normal: Vec2,

@@ -22,6 +22,7 @@ const SHOT_X_MIN: f64 = -0.78;
 /// The active skill.
 #[derive(Debug, Clone)]
 enum Skill {
+    /// No skill: the mallet waits in front of the goal.
     Wait,
     Defend(Defend),
     Hit(Hit),

@@ -36,19 +36,23 @@ struct Tally {
     episodes: u32,
     successes: u32,
     steps: u32,
-    /// Episodes that violated the constraint of the end effector; the next three likewise.
+    /// Episodes with a violation: of the end effector's bounds, of the lowest height of elbow and wrist, of joint positions, and of
+    /// joint velocities.
     ee: u32,
     link: u32,
     joint_pos: u32,
     joint_vel: u32,
-    worst_height_m: f64,
+    /// Largest deviation of the mallet from its desired height.
+    worst_height_error_m: f64,
     /// Largest joint speed relative to its limit.
     worst_speed_share: f64,
+    /// Computation times of the agent: the longest, and the sum.
     longest_act_ms: f64,
-    act_ms: f64,
+    total_act_ms: f64,
 }
 
 impl Tally {
+    /// Penalty points without those for computation time.
     fn penalty(&self) -> f64 {
         f64::from(3 * self.ee + 3 * self.link + 2 * self.joint_pos + self.joint_vel)
     }
@@ -124,9 +128,9 @@ fn main() -> anyhow::Result<()> {
             tally.joint_vel,
             tally.episodes,
             f64::from(tally.steps) / n,
-            1e3 * tally.worst_height_m,
+            1e3 * tally.worst_height_error_m,
             tally.worst_speed_share,
-            tally.act_ms / f64::from(tally.steps),
+            tally.total_act_ms / f64::from(tally.steps),
             tally.longest_act_ms,
         );
     }
@@ -145,12 +149,12 @@ fn play(
         let start = Instant::now();
         let action = agent.act(&observation)?;
         let duration_ms = 1e3 * start.elapsed().as_secs_f64();
-        tally.act_ms += duration_ms;
+        tally.total_act_ms += duration_ms;
         tally.longest_act_ms = tally.longest_act_ms.max(duration_ms);
         let outcome = episode.step(action.as_flattened());
         let state = episode.state();
-        tally.worst_height_m = tally
-            .worst_height_m
+        tally.worst_height_error_m = tally
+            .worst_height_error_m
             .max((state.ee[2] - MALLET_HEIGHT_M).abs());
         tally.worst_speed_share = tally.worst_speed_share.max(speed_share(&state));
         if is_traced {

@@ -47,7 +47,7 @@ pub enum Posture {
 /// To which side of the vertical plane through base and mallet the elbow leans.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
-    /// Joint 5 negative: fast for strikes that turn to the left (+y) of the radius.
+    /// Joint 5 negative: fast for strikes that turn to the left (+y) of the line from base to mallet.
     Left,
     /// Joint 5 positive: fast for strikes that turn to the right.
     Right,
@@ -139,13 +139,14 @@ impl Arm {
         // Constant acceleration over the step, as in the cubic interpolation between its ends.
         let mut q = self.q + 0.5 * self.dt * (self.dq + dq);
         let end = forward(&q);
-        let goal = if allowed_share < 1.0 {
+        // Where the limits slow the motion down, only the height is corrected: the mallet cannot be at `position` yet.
+        let target_tip = if allowed_share < 1.0 {
             Vector3::new(end.tip.x, end.tip.y, self.height)
         } else {
             Vector3::new(position.x, position.y, self.height)
         };
         // The remaining error is small unless a reference jumped; a jump must not reach the joints.
-        let error = goal - end.tip;
+        let error = target_tip - end.tip;
         let error = error * (TIP_CORRECTION_MAX_M / error.norm().max(TIP_CORRECTION_MAX_M));
         q += least_change(&end.jacobian, &error, &self.speed_max);
         for i in 0..JOINTS {
@@ -242,30 +243,35 @@ impl Arm {
     fn strike_posture(&self, position: Vec2, side: Side) -> Joints {
         let reach = position.norm();
         // Joints 5 and 6, as linear functions of the reach.
-        let lean = (0.6 + 0.6 * (reach - 0.65)).clamp(0.5, 1.0);
+        let lean_size = (0.6 + 0.6 * (reach - 0.65)).clamp(0.5, 1.0);
         let wrist = (1.78 - 1.45 * (reach - 0.65)).clamp(0.75, 1.85);
         let lean = match side {
-            Side::Left => -lean,
-            Side::Right => lean,
+            Side::Left => -lean_size,
+            Side::Right => lean_size,
         };
-        // With joints 5 and 6 given, forearm and hand are one rigid, bent link …
+        // With joints 5 and 6 given, forearm and hand are one rigid, bent link from elbow to tip …
         let (along, across) = (
             FOREARM_M + HAND_M * wrist.cos(),
             HAND_M * wrist.sin() * lean.cos(),
         );
+        // How far the tip is outside of the vertical plane of upper arm and forearm.
         let outward = HAND_M * wrist.sin() * lean.sin();
-        let (lower, bend) = (along.hypot(across), across.atan2(along));
-        let ahead = (reach * reach - outward * outward).max(0.0).sqrt();
+        let (link_length, bend) = (along.hypot(across), across.atan2(along));
+        // The tip's horizontal distance from the base within that plane.
+        let reach_in_plane = (reach * reach - outward * outward).max(0.0).sqrt();
         // … and the rest is a triangle between shoulder, elbow and tip. Angles from the vertical.
         let rise = self.height - SHOULDER_M;
-        let distance = ahead.hypot(rise).min(0.999 * (UPPER_ARM_M + lower));
+        let distance = reach_in_plane
+            .hypot(rise)
+            .min(0.999 * (UPPER_ARM_M + link_length));
         let triangle_angle = |opposite: f64, a: f64, b: f64| {
             ((a * a + b * b - opposite * opposite) / (2.0 * a * b))
                 .clamp(-1.0, 1.0)
                 .acos()
         };
-        let shoulder = ahead.atan2(rise) - triangle_angle(lower, UPPER_ARM_M, distance);
-        let elbow = triangle_angle(distance, UPPER_ARM_M, lower);
+        let shoulder =
+            reach_in_plane.atan2(rise) - triangle_angle(link_length, UPPER_ARM_M, distance);
+        let elbow = triangle_angle(distance, UPPER_ARM_M, link_length);
         // The bent link leaves the elbow at `shoulder + π − elbow`, the forearm `bend` before that.
         let forearm = shoulder + std::f64::consts::PI - elbow - bend;
         let azimuth = position.y.atan2(position.x) - (outward / reach).clamp(-1.0, 1.0).asin();

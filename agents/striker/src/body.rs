@@ -15,12 +15,17 @@ use crate::scene::{MalletCommand, Scene};
 #[derive(Debug, Clone)]
 pub struct Body {
     task: Task,
+    /// Control period, seconds.
     dt: f64,
     field: Field,
     arm: Arm,
+    /// Estimates the puck.
     estimator: Estimator,
+    /// The opponent's mallet.
     keeper: Keeper,
+    /// Reference of the own mallet.
     mallet: Motion,
+    /// Control steps since the start of the episode or rally.
     step: u32,
 }
 

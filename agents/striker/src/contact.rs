@@ -161,6 +161,7 @@ fn add_contact(
     sum: &mut Wrench,
 ) {
     let radius = field.puck_radius;
+    // The impedance changes smoothly from the surface to the full width.
     let depth_share = depth / IMPEDANCE_WIDTH;
     let blend = if depth_share <= 0.5 {
         2.0 * depth_share * depth_share

@@ -233,6 +233,7 @@ impl Estimator {
             }
         }
         self.spin = puck.spin;
+        // A contact changes the spin by an unknown amount.
         self.spin_variance += 0.05
             + if rim.is_some() || is_touched {
                 25.0

@@ -53,7 +53,8 @@ pub enum Keeper {
 }
 
 impl Keeper {
-    /// Updates the state with the observed position of the opponent's mallet, `time` seconds after the episode's or rally's start.
+    /// Updates the state with the observed position of the opponent's mallet, `time` seconds after the start of the episode, or of the
+    /// rally if `in_game`.
     pub fn observe(&mut self, field: &Field, in_game: bool, time: f64, dt: f64, observed: Vec2) {
         match self {
             Self::Unseen if in_game => *self = Self::Opponent(RecentPositions::new(observed)),

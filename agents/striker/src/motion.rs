@@ -31,7 +31,7 @@ pub struct Target {
 impl Target {
     /// A target to stop at, reached within the limits of `pace`.
     pub fn stop(from: &Motion, pos: Vec2, pace: Pace) -> Self {
-        let brake = from.vel.norm() / pace.acceleration;
+        let braking_time = from.vel.norm() / pace.acceleration;
         let distance = (pos - from.pos).norm();
         // A quintic from rest to rest peaks at 1.875 times its mean speed and 5.77 d/T².
         let time =
@@ -39,7 +39,7 @@ impl Target {
         Self {
             pos,
             vel: Vec2::zeros(),
-            time: time.max(1.5 * brake).max(0.06),
+            time: time.max(1.5 * braking_time).max(0.06),
         }
     }
 }

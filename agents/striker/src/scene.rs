@@ -54,7 +54,7 @@ impl MalletCommand {
         let pos = scene.field.clamp_mallet(pos);
         Self::new(
             Target::stop(&scene.mallet, pos, pace),
-            Posture::Ready(lean_side(pos)),
+            Posture::Ready(elbow_side(pos)),
         )
     }
 
@@ -70,7 +70,7 @@ impl MalletCommand {
                 vel: Vec2::zeros(),
                 time,
             },
-            Posture::Ready(lean_side(pos)),
+            Posture::Ready(elbow_side(pos)),
         )
     }
 
@@ -89,7 +89,7 @@ impl MalletCommand {
 }
 
 /// The elbow's side for strikes from `pos` towards the centre of the opponent's goal.
-pub fn lean_side(pos: Vec2) -> Side {
+pub fn elbow_side(pos: Vec2) -> Side {
     if pos.y >= 0.0 {
         Side::Right
     } else {
@@ -97,18 +97,18 @@ pub fn lean_side(pos: Vec2) -> Side {
     }
 }
 
-/// The next point of a path to `goal` that keeps the mallet's centre `clearance` away from the puck:
-/// `goal` itself, or a point beside the puck.
-pub fn waypoint(scene: &Scene<'_>, goal: Vec2, clearance: f64) -> Vec2 {
+/// The next point of a path to `destination` that keeps the mallet's centre `clearance` away from the puck:
+/// `destination` itself, or a point beside the puck.
+pub fn waypoint(scene: &Scene<'_>, destination: Vec2, clearance: f64) -> Vec2 {
     let from = scene.mallet.pos;
     // The puck's position in a tenth of a second.
     let puck = scene.puck.pos + 0.1 * scene.puck.vel;
-    // If the goal is closer to the puck than the clearance, its distance is the clearance.
-    let clearance = clearance.min((goal - puck).norm() - 1e-3);
-    let path = goal - from;
+    // If the destination is closer to the puck than the clearance, its distance is the clearance.
+    let clearance = clearance.min((destination - puck).norm() - 1e-3);
+    let path = destination - from;
     let length = path.norm();
     if length < 1e-6 {
-        return goal;
+        return destination;
     }
     let direction = path / length;
     let along = (puck - from).dot(&direction);
@@ -116,7 +116,7 @@ pub fn waypoint(scene: &Scene<'_>, goal: Vec2, clearance: f64) -> Vec2 {
     let puck_to_path = nearest - puck;
     let distance = puck_to_path.norm();
     if distance >= clearance || along <= 0.0 {
-        return goal;
+        return destination;
     }
     // Pass the puck on the side of the straight path, unless the rim is there.
     let normal = Vec2::new(-direction.y, direction.x);

@@ -77,9 +77,16 @@ const fn first_agent_id() -> u32 {
 #[serde(tag = "type", rename_all = "lowercase")]
 enum Message {
     Hello(Hello),
-    Reset { episode: u64 },
-    Step { step: u64, obs: Observation },
+    Reset {
+        episode: u64,
+    },
+    Step {
+        step: u64,
+        obs: Observation,
+    },
+    /// The episode or rally has ended. It gets no answer.
     End {},
+    /// The session has ended.
     Bye {},
 }
 

@@ -9,8 +9,8 @@ use faceoff_types::{ActionSpace, RecordingColumn, RecordingColumns};
 const PUCK: [&str; 6] = ["x", "y", "yaw", "vx", "vy", "yaw_rate"];
 const POSITION: [&str; 3] = ["x", "y", "z"];
 
-/// The columns of recordings. The filtered velocities are not recorded: they follow from the other columns, and would add a tenth to the
-/// size of a dataset.
+/// The columns of recordings. The filtered joint velocities of the true state are not recorded: they follow from the other columns, and
+/// would add a tenth to the size of a dataset.
 #[must_use]
 pub fn recording_columns() -> RecordingColumns {
     let puck = || PUCK.map(|name| RecordingColumn::new(format!("puck_{name}")));
@@ -22,6 +22,7 @@ pub fn recording_columns() -> RecordingColumns {
         columns.extend(joints("q").chain(joints("dq")).map(RecordingColumn::new));
     }
     observation.extend(opponent_ee.clone());
+    // The two angles of the universal joint, through which the mallet hangs on the arm, and the end effector (`ee`), the arm's tip.
     state.extend(["universal_1", "universal_2", "ee_x", "ee_y", "ee_z"].map(RecordingColumn::new));
     state.extend(joints("opponent_q").map(RecordingColumn::optional));
     state.extend(opponent_ee);

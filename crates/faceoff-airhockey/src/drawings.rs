@@ -1,5 +1,5 @@
-//! Drawings of the tasks for visitors: the table from above, with the agent on the left. Units as in
-//! [`TaskInfo::drawing`](faceoff_types::TaskInfo::drawing).
+//! Drawings of the tasks for visitors: the table from above, with the agent on the left. They are elements of an SVG drawing of
+//! 120 × 64 units, with the classes of [`TaskInfo::drawing`](faceoff_types::TaskInfo::drawing).
 
 /// Rim, middle line and goals.
 macro_rules! table {

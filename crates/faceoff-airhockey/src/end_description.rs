@@ -11,7 +11,7 @@ use faceoff_types::{AgentFaultKind, EpisodeEnd, Task};
 const HIT: Task = AirHockeyTask::Hit.name();
 const PREPARE: Task = AirHockeyTask::Prepare.name();
 
-/// The beginning of descriptions of hits that passed the goal line below the required speed.
+/// The beginning of descriptions of episodes of `hit` whose puck entered the opponent's goal below the required speed.
 pub const SLOW_GOAL: &str = "no goal, since it was too slow";
 /// The beginning of descriptions of own goals.
 pub const OWN_GOAL: &str = "own goal";

@@ -60,7 +60,7 @@ pub const RULESET: Ruleset = AirHockeyRuleset::CURRENT.name();
 
 /// The simulator that teams have, without perturbations.
 pub const IDEAL: Profile = AirHockeyProfile::Ideal.name();
-/// The plant's masses, gains and friction differ from the nominal model.
+/// Masses, gains and friction of the *plant*, the robot in the evaluator's simulator, differ from the nominal model that teams have.
 pub const MODEL_MISMATCH: Profile = AirHockeyProfile::ModelMismatch.name();
 /// Noise on the observations.
 pub const OBSERVATION_NOISE: Profile = AirHockeyProfile::ObservationNoise.name();
@@ -237,6 +237,7 @@ const fn ruleset(ruleset: AirHockeyRuleset) -> RulesetInfo {
     RulesetInfo {
         ruleset: ruleset.name(),
         action_limit: match ruleset {
+            // It only required finite numbers.
             AirHockeyRuleset::First => f64::MAX,
             AirHockeyRuleset::Second | AirHockeyRuleset::Third => ACTION_LIMIT,
         },
@@ -301,12 +302,12 @@ mod tests {
             .map(|task| task.weight.as_f64())
             .sum();
         assert_eq!(weights, 1.0);
-        let most: f64 = competition
+        let max_points: f64 = competition
             .violations
             .iter()
             .map(|violation| violation.points[1])
             .sum();
-        assert_eq!(most, MAX_EPISODE_PENALTY);
+        assert_eq!(max_points, MAX_EPISODE_PENALTY);
     }
 
     #[test]

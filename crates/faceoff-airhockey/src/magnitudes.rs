@@ -87,7 +87,7 @@ pub(crate) fn magnitudes() -> Vec<MagnitudeInfo> {
             Number(disturbance.sigma_n_per_m_s),
             [0.0, 1.0],
         ),
-        // The noise process is advanced every millisecond.
+        // The force changes once a millisecond, so a shorter time constant would make no difference.
         air_flow(
             "correlation_time_s",
             "Time constant with which the force changes, s.",
@@ -148,7 +148,8 @@ pub(crate) fn perturbation_settings(
     magnitudes.to_settings().map_err(|error| error.to_string())
 }
 
-/// Checks that a plant with its accepted deviations can be drawn for the season. It takes up to a second, but not with the ruleset's magnitudes.
+/// Checks that a plant with its accepted deviations can be drawn for the season, which takes up to a second. It is skipped for the
+/// ruleset's magnitudes, which are known to be possible.
 pub(crate) fn check_plant_can_be_drawn(
     magnitudes: &Magnitudes,
     mismatch_seed: Seed,

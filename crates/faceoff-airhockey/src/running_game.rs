@@ -194,6 +194,7 @@ impl<S: GameSink> RunningGame<S> {
             [0, 1].map(|side| self.apply_response(side, &responses[side], step, game_step));
         let commands = [0, 1].map(|side| match (&responses[side], effects[side]) {
             (Response::Answer { action, .. }, Effect::InTime) => Command::Act(action),
+            // The arm holds its position, as after a late answer.
             _ => Command::Late,
         });
         let observations = [0, 1].map(|robot| &self.game.observation(robot)[..]);

@@ -21,9 +21,11 @@ pub(crate) struct RunningSide {
     window: GameWindow,
     /// Constraints violated in the current window.
     violated: ViolatedConstraints,
+    /// Computation times of the answers in the current window.
     window_times: TimeSum,
     /// The windows before the current one.
     windows: Vec<GameWindow>,
+    /// All faults of the game so far.
     faults: Vec<GameFault>,
     late_answers: u32,
     /// Computation times of all answers, in order, in seconds.
@@ -189,6 +191,7 @@ mod tests {
         // If the game continues, the fault is in the next window.
         let mut continued = side.clone();
         continued.record_step(&ConstraintValues::default());
+        // Steps and faults of each window.
         let faults = |side: RunningSide| -> Vec<(u32, u32)> {
             let windows = side.finish(0, 0).0.windows;
             windows.iter().map(|w| (w.steps, w.faults)).collect()

@@ -23,7 +23,7 @@ pub fn simulator() -> Arc<AirHockey> {
     SIMULATOR.clone()
 }
 
-/// The Robot Air Hockey Challenge.
+/// The simulator of the Robot Air Hockey Challenge, with the description of the competition.
 #[derive(Debug)]
 pub struct AirHockey {
     competition: Arc<Competition>,

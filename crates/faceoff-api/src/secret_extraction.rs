@@ -15,12 +15,12 @@ const DIGITS: usize = 64;
 pub fn extract_secret(text: &str) -> &str {
     let found = text.match_indices(PREFIX).find_map(|(start, _)| {
         let rest = &text[start + PREFIX.len()..];
-        let kind = rest.find('_')?;
-        let is_kind = kind > 0 && rest[..kind].bytes().all(|byte| byte.is_ascii_lowercase());
-        let digits = rest.get(kind + 1..kind + 1 + DIGITS)?;
-        let end = start + PREFIX.len() + kind + 1 + DIGITS;
-        let continues = text[end..].starts_with(|c: char| c.is_ascii_alphanumeric());
-        (is_kind && is_hex(digits) && !continues).then(|| &text[start..end])
+        let (kind, after_kind) = rest.split_once('_')?;
+        let is_kind = !kind.is_empty() && kind.bytes().all(|byte| byte.is_ascii_lowercase());
+        let digits = after_kind.get(..DIGITS)?;
+        let is_longer = after_kind[DIGITS..].starts_with(|c: char| c.is_ascii_alphanumeric());
+        let len = PREFIX.len() + kind.len() + 1 + DIGITS;
+        (is_kind && is_hex(digits) && !is_longer).then(|| &text[start..start + len])
     });
     found.unwrap_or_else(|| text.trim())
 }
@@ -54,18 +54,18 @@ impl InvitationLink {
     }
 
     fn find_plain(text: &str) -> Option<Self> {
-        const CODE: &str = "fo_invite_";
-        let start = text.find(CODE)?;
-        let rest = &text[start + CODE.len()..];
-        let end = rest
+        const CODE_PREFIX: &str = "fo_invite_";
+        let start = text.find(CODE_PREFIX)?;
+        let rest = &text[start + CODE_PREFIX.len()..];
+        let digits_len = rest
             .find(|c: char| !c.is_ascii_alphanumeric())
             .unwrap_or(rest.len());
-        let code = &text[start..start + CODE.len() + end];
+        let code = &text[start..start + CODE_PREFIX.len() + digits_len];
         let server = text[..start].strip_suffix("/join/").and_then(|before| {
             let scheme = before.rfind("https://").or_else(|| before.rfind("http://"));
             scheme.map(|scheme| before[scheme..].to_owned())
         });
-        (end > 0).then(|| Self {
+        (digits_len > 0).then(|| Self {
             server,
             code: code.to_owned(),
         })
@@ -87,6 +87,7 @@ fn without_wrapping(text: &str) -> String {
         let line = line.strip_suffix('=').unwrap_or(line);
         plain.extend(line.chars().filter(|c| !is_invisible(*c)));
     }
+    // Quoted-printable mails may escape the underscore, and JSON the slash.
     plain.replace("=5F", "_").replace("\\/", "/")
 }
 

@@ -242,6 +242,7 @@ fn read_error(error: io::Error) -> ArchiveError {
 /// Reads at most `remaining_bytes`, then fails if there are more.
 struct BoundedReader<R> {
     inner: R,
+    /// Shared with [`read`], which sets it to the total of the files once the manifest is known.
     remaining_bytes: Rc<Cell<u64>>,
 }
 

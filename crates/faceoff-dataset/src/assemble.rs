@@ -1,5 +1,5 @@
 //! Joins the shards of an evaluation into its dataset, and scores it. A *shard* is the recording of a range of episodes of
-//! one task, played in one *slot* (a worker's place for one agent).
+//! one task, played in one *slot* (a place of a worker in which one job runs at a time).
 
 use crate::{
     archive_writer::ArchiveWriter,
@@ -38,7 +38,7 @@ pub struct AssembledDataset {
     /// Size and hash of the archive. Once published, they authenticate every byte of it.
     pub archive: FileDigest,
     /// Was a pack of clips written? A clip is a compact recording of one episode, for replays in the browser.
-    pub clips: bool,
+    pub has_clips: bool,
 }
 
 /// Joins the recordings of all shards of an evaluation, in any order, into one zip archive:
@@ -63,8 +63,8 @@ pub fn assemble(
         .iter()
         .map(|dir| ShardRecording::open(dir, simulator))
         .collect::<Result<Vec<_>, _>>()?;
-    let order = |task: Task| meta.task_weights.tasks().position(|other| other == task);
-    shards.sort_by_key(|shard| (order(shard.spec.task), shard.spec.episodes.start));
+    let task_position = |task: Task| meta.task_weights.tasks().position(|other| other == task);
+    shards.sort_by_key(|shard| (task_position(shard.spec.task), shard.spec.episodes.start));
     let episodes = check_shards(meta, &shards)?;
     let calibration = calibration(&shards);
     let competition = simulator.competition();
@@ -103,7 +103,7 @@ pub fn assemble(
         Ok(archive) => Ok(AssembledDataset {
             result: scored.result,
             archive,
-            clips: match clips {
+            has_clips: match clips {
                 Some(path) => join_clips(&shards, path)?,
                 None => false,
             },
@@ -232,7 +232,7 @@ fn check_shards(
     Ok(episodes)
 }
 
-/// The timing measurements of each slot.
+/// The timing measurements of each slot, for the dataset's file `calibration.json`.
 fn calibration(shards: &[ShardRecording]) -> CalibrationFile {
     CalibrationFile {
         schema: DATASET_SCHEMA.to_owned(),

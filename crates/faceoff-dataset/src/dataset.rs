@@ -259,6 +259,7 @@ impl Dataset {
         self.container.bytes(name)
     }
 
+    /// Opens a table after a check of its hash, unless that was checked before.
     fn table(&self, name: &str) -> Result<FileRange, DatasetError> {
         self.check_hash_on_read(name)?;
         self.range(name)

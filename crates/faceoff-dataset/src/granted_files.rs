@@ -9,6 +9,7 @@ pub fn writable_files(grant: &Grant) -> &'static [&'static str] {
     match (&grant.write_scope, &grant.expected_recording) {
         (WriteScope::Folder(_), ExpectedRecording::Shard(_)) => &SHARD_FILES,
         (WriteScope::Folder(_), ExpectedRecording::Game(_)) => &GAME_FILES,
+        // A job of an ablation, of which only the clips are stored.
         (WriteScope::File(_), _) => &[CLIPS_FILE],
         (WriteScope::Folder(_), ExpectedRecording::None) | (WriteScope::None, _) => &[],
     }

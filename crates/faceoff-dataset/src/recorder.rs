@@ -13,8 +13,8 @@ use faceoff_types::{Competition, EpisodeOutcome, Task};
 use fs_err::File;
 use std::{io::BufWriter, sync::Arc};
 
-/// Writes both tables and the clips of a shard while it is played. Memory is bounded by one episode and one row
-/// group.
+/// Writes the tables of control steps and of episodes, and the clips of a shard while it is played. Memory is bounded by one
+/// episode and one row group.
 pub struct Recorder {
     steps: StepRows,
     steps_file: TableWriter,

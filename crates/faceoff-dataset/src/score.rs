@@ -31,7 +31,7 @@ pub(crate) struct Measurements {
     pub constraint_values: Vec<f64>,
 }
 
-/// Collects the data of a task for scoring, in order of play.
+/// Collects the data of a task for its score and for `violations.json`, in order of play.
 #[derive(Debug)]
 pub(crate) struct Tally {
     outcomes: Vec<EpisodeOutcome>,
@@ -74,13 +74,19 @@ impl Tally {
     pub fn add_steps(&mut self, episode: u32, measured: &Measurements) {
         let count = self.violations.len();
         for (step, timing) in measured.timings.iter().enumerate() {
-            let limits = &measured.constraint_values[step * count..][..count];
+            let constraint_values = &measured.constraint_values[step * count..][..count];
             let step = u32::try_from(step).unwrap_or(u32::MAX);
-            self.add_step(episode, step, *timing, limits);
+            self.add_step(episode, step, *timing, constraint_values);
         }
     }
 
-    fn add_step(&mut self, episode: u32, step: u32, timing: AnswerTiming, limits: &[f64]) {
+    fn add_step(
+        &mut self,
+        episode: u32,
+        step: u32,
+        timing: AnswerTiming,
+        constraint_values: &[f64],
+    ) {
         let AnswerTiming {
             computation_time_s,
             host_time_s,
@@ -103,7 +109,7 @@ impl Tally {
             };
             slowest.insert(episode, (computation_time_s, slow));
         }
-        for ((_, violations), &value) in self.violations.iter_mut().zip(limits) {
+        for ((_, violations), &value) in self.violations.iter_mut().zip(constraint_values) {
             if value.is_nan() || value <= 0.0 {
                 continue;
             }
@@ -163,7 +169,7 @@ impl Tally {
             .iter()
             .map(|name| batch[name.as_str()].as_primitive::<Float64Type>())
             .collect();
-        let mut limits = Vec::with_capacity(constraints.len());
+        let mut constraint_values = Vec::with_capacity(constraints.len());
         for row in 0..batch.num_rows() {
             let timing = AnswerTiming {
                 computation_time_s: seconds(times.value(row)),
@@ -172,9 +178,10 @@ impl Tally {
                     .is_valid(row)
                     .then(|| seconds(cpu_times.value(row))),
             };
-            limits.clear();
-            limits.extend(constraints.iter().map(|column| column.value(row)));
-            self.add_step(episodes.value(row), steps.value(row), timing, &limits);
+            constraint_values.clear();
+            constraint_values.extend(constraints.iter().map(|column| column.value(row)));
+            let (episode, step) = (episodes.value(row), steps.value(row));
+            self.add_step(episode, step, timing, &constraint_values);
         }
     }
 
@@ -206,14 +213,15 @@ pub(crate) struct ScoredEvaluation {
     pub violations: ViolationsFile,
 }
 
-/// The rules of a score: a dataset and an evaluation have them in different places.
+/// What a score depends on besides the episodes. For a new dataset it comes from the evaluation, for verification from the
+/// dataset's manifest.
 pub(crate) struct ScoreRules<'a> {
     pub competition: &'a Competition,
     pub ruleset: Ruleset,
     pub profile: Profile,
     pub variation: &'a Variation,
     pub weights: &'a TaskWeights,
-    /// Without them there are no tiers.
+    /// Bounds of the tiers; `None` in a competition without tiers.
     pub bounds: Option<TierBounds>,
     pub seed: Seed,
     /// The layout that `violations.json` names.

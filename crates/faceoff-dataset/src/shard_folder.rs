@@ -180,7 +180,7 @@ impl ShardRecording {
         })?;
         let shard: ShardFile =
             serde_json::from_slice(&text).map_err(|e| unreadable(SHARD_FILE)(&e))?;
-        let table = match &*shard.schema {
+        let table_at = match &*shard.schema {
             SHARD_SCHEMA | WITHOUT_CLIPS_SCHEMA => ShardTable::Current,
             old if OLD_SHARD_SCHEMAS.contains(&old) => ShardTable::Earlier,
             other => {
@@ -229,8 +229,8 @@ impl ShardRecording {
         Ok(Self {
             spec: shard.spec,
             report,
-            steps: table(dir.join(STEPS_FILE)),
-            episodes: table(dir.join(EPISODES_FILE)),
+            steps: table_at(dir.join(STEPS_FILE)),
+            episodes: table_at(dir.join(EPISODES_FILE)),
             clips: has_clips.then(|| dir.join(CLIPS_FILE)),
         })
     }

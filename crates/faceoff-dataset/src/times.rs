@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-/// A measured time in whole nanoseconds, as in the tables: a third of the size of the same time in seconds. Clocks
+/// A measured time in whole nanoseconds, as in the tables, where it takes a third of the space of the same time in seconds. Clocks
 /// have nanosecond resolution, so [`seconds`] returns the original number.
 pub(crate) fn nanoseconds(time_s: f64) -> i64 {
     // Saturates after 292 years.

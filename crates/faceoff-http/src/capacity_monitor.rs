@@ -16,7 +16,7 @@ const CHECK_INTERVAL: Duration = Duration::from_secs(60);
 #[derive(Debug, Clone, PartialEq)]
 pub struct CapacityWarning {
     pub stage: StageName,
-    /// The open episodes, the deadline, and a sentence about both.
+    /// The number of episodes that are left, the deadline, and a sentence about both.
     pub load: DayLoad,
 }
 

@@ -22,15 +22,16 @@ const MIN_CROWDED_REQUESTS: usize = 64;
 /// Longest time that a visitor's reading request may wait until the async runtime continues it. After a longer wait it is refused.
 const MAX_WAIT: Duration = Duration::from_millis(20);
 
-/// Readiness probes in flight. A balancer sends one at a time.
+/// Most readiness probes in flight. A load balancer sends one at a time.
 const MAX_PROBES: usize = 16;
 
 /// Counts the requests in flight.
 #[derive(Debug, Clone)]
 pub(crate) struct InFlight {
     app: Arc<AppState>,
+    /// One for each request in flight.
     permits: PriorityPermits,
-    /// Of readiness probes, which anyone can send: they take no places of teams.
+    /// One for each readiness probe in flight. Anyone can send probes, so they must not use up the permits of other requests.
     probes: PriorityPermits,
 }
 
@@ -65,10 +66,11 @@ pub(crate) async fn limit(
     if request.uri().path() == LIVE_PATH {
         return next.run(request).await;
     }
-    // A balancer would take a server that is not ready from teams and organisers, too.
+    // A load balancer stops sending requests to a server that is not ready, those of teams and organisers, too. So probes are
+    // refused last.
     if request.uri().path() == READY_PATH {
         let probe = in_flight.probes.take(Precedence::Organiser);
-        // A server that has no place even for organisers is not ready.
+        // A server that has no permit left even for organisers is not ready.
         let is_full = in_flight.permits.take(Precedence::Organiser).is_none();
         if probe.is_none() || is_full {
             return in_flight.refuse("in_flight");

@@ -115,8 +115,8 @@ async fn serve_cached(
     mut request: Request,
     next: Next,
 ) -> Response {
-    let second = app.config.clock.now().as_second();
-    match answer_cache::cache_key(&mut request, &app.store, second) {
+    let current_second = app.config.clock.now().as_second();
+    match answer_cache::cache_key(&mut request, &app.store, current_second) {
         Some(key) => answer_cache::get(&app.answer_cache, key, next.run(request)).await,
         None => next.run(request).await,
     }
@@ -159,14 +159,15 @@ async fn add_change_quota_headers(mut request: Request, next: Next) -> Response 
     if request.method().is_safe() {
         return next.run(request).await;
     }
-    let slot = RemainingChangesSlot::default();
-    request.extensions_mut().insert(slot.clone());
+    let remaining_changes = RemainingChangesSlot::default();
+    request.extensions_mut().insert(remaining_changes.clone());
     let mut response = next.run(request).await;
-    slot.add_headers(response.headers_mut());
+    remaining_changes.add_headers(response.headers_mut());
     response
 }
 
-/// As how many requests one with this path counts. A search reads all of the documentation; a picture of a card is drawn.
+/// How many requests a request with this path counts as in the rate limit. A search reads all of the documentation, and the
+/// picture of a card (what a chat shows of a link) has to be drawn.
 fn request_cost(path: &str) -> NonZeroU32 {
     const SEARCH: NonZeroU32 = NonZeroU32::new(10).unwrap();
     const CARD: NonZeroU32 = NonZeroU32::new(5).unwrap();

@@ -80,8 +80,8 @@ async fn store_file(
     Path(name): Path<String>,
     body: Body,
 ) -> Result<StatusCode, Problem> {
-    let is_expected = writable_files(&grant).contains(&&*name);
-    let key = grant.storage_key(&name).filter(|_| is_expected);
+    let is_writable = writable_files(&grant).contains(&&*name);
+    let key = grant.storage_key(&name).filter(|_| is_writable);
     let key = key.ok_or_else(|| Problem::not_found("file of this job's recording"))?;
     free_space::check(&app)?;
     let (dir, rate) = (&app.config.upload_dir, app.config.limits.min_upload_rate);

@@ -11,8 +11,8 @@ use super::{
 use askama::Template;
 use axum::{extract::State, response::Response};
 use faceoff_api::views::{
-    clips::TimeBinView,
     decision::DecisionView,
+    episodes::TimeBinView,
     evaluation::{EvaluationStatus, EvaluationView, Progress, ResultView},
     queue::QueueView,
     task::TaskView,

@@ -8,9 +8,9 @@ use faceoff_types::{DepartureKind, RoundNumber, TournamentFormat, TournamentRule
 pub(super) fn phase_label(summary: &TournamentSummary) -> String {
     let phase = match summary.phase {
         TournamentPhase::Open => "open, no round started yet",
-        TournamentPhase::Round => "round in progress",
-        TournamentPhase::Between => "between rounds",
-        TournamentPhase::Played => "all rounds played",
+        TournamentPhase::RoundRunning => "round in progress",
+        TournamentPhase::BetweenRounds => "between rounds",
+        TournamentPhase::AllRoundsPlayed => "all rounds played",
         TournamentPhase::Closed => "closed",
     };
     match (&summary.paused, summary.phase) {

@@ -11,7 +11,7 @@ use axum::{
     http::HeaderMap,
     response::{IntoResponse, Response},
 };
-use faceoff_api::views::clips::EpisodesView;
+use faceoff_api::views::episodes::EpisodesView;
 use faceoff_replay::ClipKey;
 use faceoff_service::{
     app::App,

@@ -27,7 +27,7 @@ impl Scorer {
         let clips = folder.join("clips");
         let assembled = evaluator.assemble(meta, &recordings, &archive, &clips)?;
         self.files
-            .store_dataset(dataset, &archive, assembled.clips.then_some(&*clips))
+            .store_dataset(dataset, &archive, assembled.has_clips.then_some(&*clips))
             .context("storing the dataset")?;
         Ok(JobReport::Scoring {
             dataset: dataset.to_owned(),

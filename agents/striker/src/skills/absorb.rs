@@ -108,9 +108,11 @@ impl Absorb {
             .and_then(|plan| plan_with_cost(scene, plan.time - scene.time));
         let best = cheapest_interception(scene);
         self.interception = match (current, best) {
-            (Some((_, cost)), Some((b, least))) if least < cost - SWITCH_MARGIN => Some(b),
-            (Some((k, _)), _) => Some(k),
-            (None, b) => b.map(|(b, _)| b),
+            (Some((_, cost)), Some((better, least))) if least < cost - SWITCH_MARGIN => {
+                Some(better)
+            }
+            (Some((kept, _)), _) => Some(kept),
+            (None, best) => best.map(|(plan, _)| plan),
         };
         self.interception.map(|plan| move_to(scene, &plan))
     }
@@ -123,8 +125,8 @@ impl Absorb {
             let early_enough = puck.pos.y.abs() > self.min_axis_distance;
             let next_point = waypoint(scene, plan.mallet, clearance);
             let detour = if next_point == plan.mallet { 0.0 } else { 0.4 };
-            let needed = Target::stop(&scene.mallet, next_point, Pace::QUICK).time + detour;
-            (early_enough && needed <= time_left).then_some(plan)
+            let needed_time = Target::stop(&scene.mallet, next_point, Pace::QUICK).time + detour;
+            (early_enough && needed_time <= time_left).then_some(plan)
         };
         let current = self
             .interception
@@ -157,15 +159,17 @@ fn cushioned_velocity(scene: &Scene<'_>) -> Option<Vec2> {
     let normal = offset / distance.max(1e-6);
     let gap = distance - scene.field.contact_distance();
     let closing = (scene.puck.vel - scene.mallet.vel).dot(&normal);
-    let along = scene.puck.vel.dot(&normal);
+    let puck_speed = scene.puck.vel.dot(&normal);
     let is_imminent = closing > 0.1 && gap > -0.01 && gap < CUSHION_TIME * closing;
-    (is_imminent && along > 0.0).then(|| retreat_speed(along, normal, scene.puck.pos) * normal)
+    (is_imminent && puck_speed > 0.0)
+        .then(|| retreat_speed(puck_speed, normal, scene.puck.pos) * normal)
 }
 
 /// The speed of the mallet along the puck's motion at contact. With restitution e, a mallet of speed w with (1 + e) w = e v stops a
-/// puck of speed v. Close to the own goal the mallet is slower, which sends the puck a little forward again.
-fn retreat_speed(speed: f64, along: Vec2, puck: Vec2) -> f64 {
-    let forward_speed = if along.x < -0.5 {
+/// puck of speed v. Close to the own goal the mallet is slower, which sends the puck a little forward again. `direction` is that of the
+/// retreat, a unit vector.
+fn retreat_speed(speed: f64, direction: Vec2, puck: Vec2) -> f64 {
+    let forward_speed = if direction.x < -0.5 {
         (DRAG * (REST_X - puck.x)).clamp(0.0, 0.25)
     } else {
         0.0
@@ -231,6 +235,7 @@ fn plan_interception(scene: &Scene<'_>, time_left: f64) -> Option<(Interception,
 /// The interception of a fast puck, and its cost.
 fn plan_with_cost(scene: &Scene<'_>, time_left: f64) -> Option<(Interception, f64)> {
     let (plan, puck) = plan_interception(scene, time_left)?;
+    // Only a puck that moves towards the own goal is worth the effort.
     if puck.vel.x > -0.3 * puck.vel.norm() {
         return None;
     }

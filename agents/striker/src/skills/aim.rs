@@ -1,4 +1,5 @@
 //! Aiming of strikes: in which direction the mallet must meet the puck so that the puck leaves in a desired direction.
+//! Also the normal distribution, with which the chance of a goal is estimated.
 
 use crate::field::Vec2;
 use crate::puck::Puck;

@@ -13,9 +13,9 @@ use crate::arm::Posture;
 use crate::field::Vec2;
 use crate::keeper::Keeper;
 use crate::motion::{Pace, Target};
-use crate::scene::{MalletCommand, Scene, lean_side, waypoint};
+use crate::scene::{MalletCommand, Scene, elbow_side, waypoint};
 use plan::{
-    NUDGE_THRESHOLD, NUDGE_THRESHOLD_IN_GAME, Plan, best_nudge, best_plan, refresh, replan,
+    NUDGE_THRESHOLD, NUDGE_THRESHOLD_IN_GAME, Plan, best_plan, earliest_nudge, refresh, replan,
 };
 
 /// A plan is replaced only by one whose chance of a goal is higher by this much.
@@ -124,7 +124,7 @@ impl Hit {
             Keeper::Unseen | Keeper::Pendulum(_) => NUDGE_THRESHOLD,
         };
         if self.nudges < NUDGES_MAX && best.is_some_and(|best| best.chance < threshold) {
-            best = best_nudge(scene).or(best);
+            best = earliest_nudge(scene).or(best);
         }
         let plan = match (current, best) {
             (Some(current), Some(best)) if best.chance > current.chance + SWITCH_MARGIN => {
@@ -156,11 +156,11 @@ impl Hit {
             self.phase = Phase::Swing(plan);
             return self.swing(scene, plan);
         }
-        let goal = waypoint(scene, start, scene.field.contact_distance() + 0.015);
-        let mut command = MalletCommand::stop(scene, goal, Pace::CALM);
+        let next_point = waypoint(scene, start, scene.field.contact_distance() + 0.015);
+        let mut command = MalletCommand::stop(scene, next_point, Pace::CALM);
         command.posture = Posture::Ready(plan.side);
         // Arrive in time, without haste.
-        if goal == start {
+        if next_point == start {
             command.target.time = command.target.time.min((time_left - run_up).max(0.1));
         }
         command
@@ -210,7 +210,7 @@ impl Hit {
         stop: Option<Stop>,
         wait_after_stop: f64,
     ) -> MalletCommand {
-        let posture = Posture::Strike(lean_side(scene.mallet.pos));
+        let posture = Posture::Strike(elbow_side(scene.mallet.pos));
         if scene.time < coast_end {
             return MalletCommand::coast(scene, scene.mallet.vel, posture);
         }
@@ -234,7 +234,7 @@ impl Hit {
                 vel: Vec2::zeros(),
                 time: time_left,
             },
-            Posture::Ready(lean_side(stop.pos)),
+            Posture::Ready(elbow_side(stop.pos)),
         )
     }
 }

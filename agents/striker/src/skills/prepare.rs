@@ -16,7 +16,7 @@ use strike::{BRAKE, NORMALS, Strike, is_prepared, run_up, slide_value, try_norma
 
 /// Puck speed below which a strike may be planned, m/s.
 const CALM_PUCK_SPEED: f64 = 0.1;
-/// A rolling puck is stopped if the value of its result is lower than this. Values are from 0, a failure, to 1, a prepared puck.
+/// A moving puck is stopped if the place to which it slides has a lower value. Values are from 0, a failure, to 1, a prepared puck.
 const MIN_VALUE: f64 = 0.2;
 /// A strike is planned for the puck's position this much later, about the time of the approach, seconds.
 const LEAD_TIME: f64 = 0.9;
@@ -27,7 +27,7 @@ const NORMALS_PER_STEP: usize = 2;
 
 /// A puck closer to the table's long axis than this |y| is not stopped, because crossing the axis ends the episode, metres.
 const MIN_AXIS_DISTANCE: f64 = 0.05;
-/// Time of the retreat after a strike, seconds: the puck's motion becomes known.
+/// Time of the retreat after a strike, seconds. Meanwhile the estimate of the puck's motion becomes certain.
 const RETREAT_TIME: f64 = 0.25;
 
 #[derive(Debug, Clone, Copy)]
@@ -40,7 +40,7 @@ enum Phase {
     /// Moves to the start of the run-up. `puck` is the position for which the strike is planned.
     Approach { strike: Strike, puck: Vec2 },
     /// Accelerates, strikes and brakes. Times are in seconds since the episode's start.
-    Run { strike: Strike, contact_time: f64 },
+    Strike { strike: Strike, contact_time: f64 },
     /// Keeps clear of the puck until `end_time`.
     Retreat { end_time: f64 },
 }
@@ -48,7 +48,7 @@ enum Phase {
 #[derive(Debug, Clone)]
 pub struct Prepare {
     phase: Phase,
-    /// Stops a puck that rolls in a bad direction.
+    /// Stops a puck that slides in a bad direction.
     absorb: Absorb,
 }
 
@@ -65,7 +65,7 @@ impl Prepare {
 
     /// Whether a strike is running that must not be interrupted.
     pub fn is_committed(&self) -> bool {
-        matches!(self.phase, Phase::Run { .. } | Phase::Retreat { .. })
+        matches!(self.phase, Phase::Strike { .. } | Phase::Retreat { .. })
     }
 
     /// The command for this control step.
@@ -73,10 +73,10 @@ impl Prepare {
         match self.phase {
             Phase::Search { next_normal, best } => self.search(scene, next_normal, best),
             Phase::Approach { strike, puck } => self.approach(scene, strike, puck),
-            Phase::Run {
+            Phase::Strike {
                 strike,
                 contact_time,
-            } => self.run(scene, strike, contact_time),
+            } => self.strike(scene, strike, contact_time),
             Phase::Retreat { end_time } => {
                 if scene.time > end_time {
                     self.phase = Phase::Search {
@@ -161,7 +161,7 @@ impl Prepare {
         let distance = (scene.mallet.pos - start).norm();
         if next_point == start && distance < 0.004 && scene.mallet.vel.norm() < 0.05 {
             let time = 2.0 * (contact - start).norm() / strike.velocity.norm();
-            self.phase = Phase::Run {
+            self.phase = Phase::Strike {
                 strike,
                 contact_time: scene.time + time.max(2.0 * scene.dt),
             };
@@ -178,7 +178,7 @@ impl Prepare {
         )
     }
 
-    fn run(&mut self, scene: &Scene<'_>, strike: Strike, contact_time: f64) -> MalletCommand {
+    fn strike(&mut self, scene: &Scene<'_>, strike: Strike, contact_time: f64) -> MalletCommand {
         let time_left = contact_time - scene.time;
         if time_left <= 0.5 * scene.dt {
             // Brake at once; the puck leaves faster than the mallet.

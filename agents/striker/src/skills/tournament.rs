@@ -8,11 +8,12 @@ use crate::scene::{MalletCommand, Scene};
 /// After the puck has been on the own half for this time, it is shot also from positions that are avoided otherwise, seconds.
 const URGENT_TIME: f64 = 6.0;
 
-/// A mode that waits for a strike ends after this time, seconds.
+/// The mode `Hit` ends if no strike was possible for this time, seconds.
 const STRIKE_TIMEOUT: f64 = 6.0;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Mode {
+    /// Waits in front of the goal while the puck is on the opponent's half.
     Wait,
     Defend,
     Prepare,

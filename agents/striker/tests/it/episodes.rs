@@ -65,7 +65,7 @@ fn hit_scores_and_stays_deployable() {
 }
 
 #[test]
-fn defend_scores_and_stays_deployable() {
+fn defend_succeeds_and_stays_deployable() {
     let (successes, points) = play(AirHockeyTask::Defend);
     assert!(
         successes >= 6 && points <= DEPLOYABLE_POINTS_MAX,
@@ -74,7 +74,7 @@ fn defend_scores_and_stays_deployable() {
 }
 
 #[test]
-fn prepare_scores_and_stays_deployable() {
+fn prepare_succeeds_and_stays_deployable() {
     let (successes, points) = play(AirHockeyTask::Prepare);
     assert!(
         successes >= 7 && points <= DEPLOYABLE_POINTS_MAX,

@@ -22,7 +22,7 @@ pub struct BoardQuery {
     /// Use only results up to this day, which must have results. Default: all days.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub day: Option<Date>,
-    /// Which of a team's evaluations its row shows. Default: the stage's `standings`.
+    /// Which of a team's evaluations its row shows. Default: as the stage's setting `standings` says.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[param(inline)]
     pub by: Option<BoardBy>,
@@ -135,6 +135,7 @@ impl BoardColumn {
     /// The column's name in a query.
     pub fn as_str(&self) -> &str {
         match self {
+            // Another name than "place" would break links to sorted boards.
             Self::Rank => "place",
             Self::Team => "team",
             Self::Score => "score",
@@ -208,7 +209,7 @@ pub struct HistoryQuery {
     /// Rank by this task. Default: by all tasks together.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub task: Option<Task>,
-    /// Which of a team's evaluations ranks it. Default: the stage's `standings`.
+    /// Which of a team's evaluations ranks it. Default: as the stage's setting `standings` says.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[param(inline)]
     pub by: Option<BoardBy>,

@@ -270,8 +270,9 @@ fn replace<T: Clone>(value: &mut T, new: Option<&T>) -> bool {
 }
 
 impl StagePatch {
-    /// Changes the rules and settings of a stage and checks the result. If the patch has rules, they are rules of `newest`,
-    /// the ruleset of new evaluations; otherwise a stage keeps its ruleset when a newer server version brings another one.
+    /// Changes the rules and settings of a stage and checks the result. The name, the times and the time zone are not among them:
+    /// the caller changes those. If the patch has rules, they are rules of `newest`, the ruleset of new evaluations; otherwise a
+    /// stage keeps its ruleset when a newer server version brings another one.
     ///
     /// # Errors
     /// The first value that is invalid after the change.

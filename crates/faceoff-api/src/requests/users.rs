@@ -37,7 +37,8 @@ pub enum CreatedCredentials {
 #[serde(default, deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct RevocationQuery {
-    /// What happens to all that was made with the token. Default: it ends, unless the token is your own: others may have used it.
+    /// What happens to all that was made with the token. Default: it ends, because others may have used the token;
+    /// if the token is your own, it stays.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[param(inline)]
     pub made: Option<CreatedCredentials>,

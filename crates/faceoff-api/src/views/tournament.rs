@@ -44,11 +44,14 @@ pub enum TournamentPhase {
     /// No round has started: entrants and rules may change.
     Open,
     /// A round is running: a game lacks a result that it can still get.
-    Round,
+    #[serde(rename = "round")]
+    RoundRunning,
     /// All games of the started rounds have results; another round follows.
-    Between,
+    #[serde(rename = "between")]
+    BetweenRounds,
     /// All rounds are over.
-    Played,
+    #[serde(rename = "played")]
+    AllRoundsPlayed,
     /// An organiser has closed it.
     Closed,
 }

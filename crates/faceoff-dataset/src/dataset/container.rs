@@ -149,6 +149,7 @@ impl Container {
         }
     }
 
+    /// Opens a file, and reads it with `read`.
     fn read<T>(
         &self,
         name: &str,

@@ -15,7 +15,7 @@ use std::sync::Arc;
 /// A table is read if it has at most twice the expected number of rows, plus this number.
 const SURPLUS_ROWS: u64 = 1000;
 
-/// One row of `episodes.parquet`, without the states and hashes.
+/// One row of `episodes.parquet`, without the hashes. Its JSON has neither observation nor state.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EpisodeRecord {
     /// The outcome, as scoring uses it.
@@ -100,11 +100,13 @@ impl<'a> Columns<'a> {
             .expect("the columns were checked when the table was read")
     }
 
+    /// The text in a cell; `None` for null.
     pub fn text(&self, name: &str, row: usize) -> Option<&'a str> {
         let column: &StringArray = self.column(name).as_string();
         column.is_valid(row).then(|| column.value(row))
     }
 
+    /// The number in a cell; `None` for null.
     pub fn int(&self, name: &str, row: usize) -> Option<u32> {
         let column: &UInt32Array = self.column(name).as_primitive::<UInt32Type>();
         column.is_valid(row).then(|| column.value(row))

@@ -42,12 +42,13 @@ pub(super) fn check(table: &impl ChunkReader, footer: &ParquetMetaData) -> Resul
 fn check_column(table: &impl ChunkReader, column: &ColumnChunkMetaData) -> Result<()> {
     let (mut position, length) = column.byte_range();
     let end = position + length;
-    let mut unread_uncompressed = column.uncompressed_size().unsigned_abs();
+    // Bytes before compression that the pages may still state.
+    let mut remaining_uncompressed = column.uncompressed_size().unsigned_abs();
     // Each page has a value, but for a dictionary and a page of no rows.
     let mut remaining_pages = column.num_values().unsigned_abs().saturating_add(2);
     while position < end {
         let page = read_header(table, position..end)?;
-        unread_uncompressed = unread_uncompressed
+        remaining_uncompressed = remaining_uncompressed
             .checked_sub(page.uncompressed)
             .ok_or_else(|| larger_than_stated(column))?;
         remaining_pages = remaining_pages.checked_sub(1).ok_or_else(|| {

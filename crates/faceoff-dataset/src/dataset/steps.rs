@@ -30,14 +30,14 @@ pub(crate) fn check_columns(
     expected: &Schema,
 ) -> Result<(), DatasetError> {
     for field in expected.fields() {
-        let ok = found.column_with_name(field.name()).is_some_and(|(_, f)| {
+        let has_type = found.column_with_name(field.name()).is_some_and(|(_, f)| {
             // Other writers name a list's items differently; only their type matters.
             match (f.data_type(), field.data_type()) {
                 (DataType::List(a), DataType::List(b)) => a.data_type() == b.data_type(),
                 (a, b) => a == b,
             }
         });
-        if !ok {
+        if !has_type {
             return Err(DatasetError::Unreadable(format!(
                 "{file} has no column {} of type {}",
                 field.name(),
@@ -63,8 +63,8 @@ pub(super) fn reader<R: ChunkReader + 'static>(
 ) -> Result<ParquetRecordBatchReaderBuilder<R>, DatasetError> {
     let found = metadata.schema();
     let lacks_host_time = lacks_host_time(found);
-    let all = step_schema(&competition.recording);
-    let fields = all.fields().iter();
+    let current_schema = step_schema(&competition.recording);
+    let fields = current_schema.fields().iter();
     let fields = fields.filter(|field| !lacks_host_time || field.name() != HOST_TIME);
     let expected = Schema::new(fields.cloned().collect::<Vec<_>>());
     check_columns(STEPS_FILE, found, &expected)?;

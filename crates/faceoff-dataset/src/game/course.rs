@@ -100,15 +100,17 @@ impl GameCourse {
             }
         };
         let score = read_score(&container)?;
-        let rows = GameRows::new();
+        // No rows are added: only the tables' schemas are needed.
+        let schemas = GameRows::new();
         let table = |name, schema: &Schema| GameTable::open(container.range(name)?, name, schema);
-        let rallies = read_rallies(table(RALLIES_FILE, rows.rallies.schema())?)?;
-        let positions = read_positions(table(MOTION_FILE, rows.motion.schema())?)?;
+        let rallies = read_rallies(table(RALLIES_FILE, schemas.rallies.schema())?)?;
+        let positions = read_positions(table(MOTION_FILE, schemas.motion.schema())?)?;
         check_rallies(&rallies, positions.len())?;
         let mut sides = [None, None];
-        for ((side, outcome), rows) in Side::BOTH.into_iter().zip(outcomes).zip(&rows.sides) {
+        for ((side, outcome), step_rows) in Side::BOTH.into_iter().zip(outcomes).zip(&schemas.sides)
+        {
             if let Some(outcome) = outcome {
-                let steps = table(steps_file(side), rows.schema())?;
+                let steps = table(steps_file(side), step_rows.schema())?;
                 sides[side.index()] = Some(SideCourse {
                     outcome,
                     violations: Violation::read(steps)?,
@@ -153,11 +155,11 @@ fn read_score(container: &Container) -> Result<GameScore, DatasetError> {
 fn read_positions(mut table: GameTable) -> Result<Vec<GamePositions>, DatasetError> {
     let mut positions = Vec::new();
     loop {
-        let rows = table.fill()?;
-        let Some(batch) = table.take(rows).filter(|_| rows > 0) else {
+        let row_count = table.fill()?;
+        let Some(batch) = table.take(row_count).filter(|_| row_count > 0) else {
             return Ok(positions);
         };
-        if positions.len() + rows > MAX_GAME_STEPS as usize {
+        if positions.len() + row_count > MAX_GAME_STEPS as usize {
             return Err(DatasetError::Unreadable(format!(
                 "{MOTION_FILE} has more rows than a game has control steps, {MAX_GAME_STEPS}"
             )));

@@ -103,6 +103,7 @@ impl RecordedEntry {
             }
             _ => {}
         }
+        // Only a fault at the agent's start names no rally (`episode`).
         let started = fault.as_ref().is_none_or(|fault| fault.episode.is_some());
         let (readiness, step_fault) = match (startup_s, interpolation, reset_s) {
             (Some(startup_s), None, None) if !started => {

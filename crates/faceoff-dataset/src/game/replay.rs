@@ -1,5 +1,5 @@
 //! Simulates a recorded game again: the recording gives the inputs (answers, times, faults), and every simulated row is
-//! compared with the recorded one.
+//! compared with the recorded one. This is not the replay that browsers show.
 
 use super::{
     conditions::game_simulation_setup,
@@ -43,17 +43,21 @@ impl GameReplay {
         let spec = &recording.manifest().spec;
         let setup = game_simulation_setup(spec)
             .map_err(|unknown| DatasetError::Foreign(unknown.to_string()))?;
-        let rows = GameRows::new();
-        let entries =
-            |side: Side| recording.table(entries_file(side), rows.entries[side.index()].schema());
-        let steps =
-            |side: Side| recording.table(steps_file(side), rows.sides[side.index()].schema());
+        let simulated_rows = GameRows::new();
+        let entries = |side: Side| {
+            let schema = simulated_rows.entries[side.index()].schema();
+            recording.table(entries_file(side), schema)
+        };
+        let steps = |side: Side| {
+            let schema = simulated_rows.sides[side.index()].schema();
+            recording.table(steps_file(side), schema)
+        };
         Ok(Self {
-            rallies: recording.table(RALLIES_FILE, rows.rallies.schema())?,
+            rallies: recording.table(RALLIES_FILE, simulated_rows.rallies.schema())?,
             entries: [entries(Side::First)?, entries(Side::Second)?],
-            motion: recording.table(MOTION_FILE, rows.motion.schema())?,
+            motion: recording.table(MOTION_FILE, simulated_rows.motion.schema())?,
             steps: [steps(Side::First)?, steps(Side::Second)?],
-            game: RunningGame::begin(&setup, spec.steps, spec.limits.clone(), rows),
+            game: RunningGame::begin(&setup, spec.steps, spec.limits.clone(), simulated_rows),
         })
     }
 
@@ -126,12 +130,13 @@ impl GameReplay {
                 .difference("steps", count.to_string(), expected)
                 .into());
         }
-        let rows = self.game.sink();
-        let simulated = batch(rows.rallies.take(), rows.rallies.schema());
+        let simulated_rows = self.game.sink();
+        let rallies = &mut simulated_rows.rallies;
+        let simulated = batch(rallies.take(), rallies.schema());
         check_same(location, row, &simulated)?;
         for side in Side::BOTH {
-            let rows = &mut rows.entries[side.index()];
-            let simulated = batch(rows.take(), rows.schema());
+            let entries = &mut simulated_rows.entries[side.index()];
+            let simulated = batch(entries.take(), entries.schema());
             let file = entries_file(side);
             check_same(
                 RowLocation { file, ..location },
@@ -202,18 +207,22 @@ impl GameReplay {
         let sides = [0, 1].map(|side| take_rows(&mut self.steps[side], count));
         let error = (0..count).find_map(|row| self.step(&sides, row, rally, recorded).err());
         // A difference before the error is reported first.
-        let rows = self.game.sink();
-        let simulated = batch(rows.motion.take(), rows.motion.schema());
+        let simulated_rows = self.game.sink();
+        let simulated_motion = &mut simulated_rows.motion;
+        let simulated = batch(simulated_motion.take(), simulated_motion.schema());
         let mut compared = vec![(MOTION_FILE, &motion, simulated)];
         for side in Side::BOTH {
-            let rows = &mut rows.sides[side.index()];
-            let simulated = batch(rows.take(), rows.schema());
+            let simulated_side = &mut simulated_rows.sides[side.index()];
+            let simulated = batch(simulated_side.take(), simulated_side.schema());
             compared.push((steps_file(side), &sides[side.index()], simulated));
         }
         let earliest = compared
             .iter()
-            .filter_map(|(file, rows, simulated)| {
-                Some((file, compare::first_row_difference(rows, simulated)?))
+            .filter_map(|(file, recorded_rows, simulated)| {
+                Some((
+                    file,
+                    compare::first_row_difference(recorded_rows, simulated)?,
+                ))
             })
             .min_by_key(|(_, cell)| cell.row);
         if let Some((file, cell)) = earliest {

@@ -1,7 +1,7 @@
 //! Joins the tables of an evaluation's shards (recordings of a part of its episodes) to one table.
 
 use super::{
-    column_orders::TypeOrders,
+    column_orders::TypeDefinedOrderWriter,
     steps::{HOST_TIME, schema_with_host_time, with_zero_host_time},
     writer::{TableWriter, schema_metadata},
 };
@@ -49,7 +49,7 @@ pub(crate) fn join<W: Write + Send>(
     temporary_dir: &Path,
     out: W,
 ) -> Result<(), RecordingError> {
-    let mut writer: Option<SerializedFileWriter<TypeOrders<W>>> = None;
+    let mut writer: Option<SerializedFileWriter<TypeDefinedOrderWriter<W>>> = None;
     let mut out = Some(out);
     for table in tables {
         let path = table.path();
@@ -64,7 +64,8 @@ pub(crate) fn join<W: Write + Send>(
             .parse_and_finish(&file)
             .map_err(join_error())?;
         if let Some(out) = out.take() {
-            writer = Some(begin(&metadata, TypeOrders::new(out)).map_err(join_error())?);
+            writer =
+                Some(begin(&metadata, TypeDefinedOrderWriter::new(out)).map_err(join_error())?);
         }
         let Some(writer) = &mut writer else {
             break;

@@ -1,6 +1,6 @@
 //! Writes a Parquet table, with row groups and pages of a size that lets readers find one episode quickly.
 
-use super::column_orders::TypeOrders;
+use super::column_orders::TypeDefinedOrderWriter;
 use crate::error::RecordingError;
 use arrow_array::{Array, ArrayRef, RecordBatch};
 use arrow_schema::{DataType, Schema, SchemaRef};
@@ -31,7 +31,7 @@ pub(crate) struct TableWriter {
     /// What the writer does, for error messages.
     context: String,
     schema: SchemaRef,
-    writer: ArrowWriter<TypeOrders<File>>,
+    writer: ArrowWriter<TypeDefinedOrderWriter<File>>,
 }
 
 impl TableWriter {
@@ -59,8 +59,12 @@ impl TableWriter {
     ) -> Result<Self, RecordingError> {
         let context = format!("writing {}", file.path().display());
         let properties = Some(properties(layout, schema)?);
-        let writer = ArrowWriter::try_new(TypeOrders::new(file), schema.clone(), properties)
-            .map_err(RecordingError::unusable(&context))?;
+        let writer = ArrowWriter::try_new(
+            TypeDefinedOrderWriter::new(file),
+            schema.clone(),
+            properties,
+        )
+        .map_err(RecordingError::unusable(&context))?;
         Ok(Self {
             context,
             schema: schema.clone(),

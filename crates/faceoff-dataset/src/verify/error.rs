@@ -15,7 +15,7 @@ pub enum VerifyError {
     /// The first difference from the simulation.
     #[error("{0}")]
     Differs(Box<Difference>),
-    /// This simulator does not have the conditions of the job.
+    /// This program does not know the ruleset, the profile or the perturbations of the job.
     #[error("the job cannot be simulated: {0}")]
     Job(String),
     /// The threads could not be started.

@@ -1,4 +1,5 @@
-//! Simulates a recorded episode again with its recorded actions, and compares every number with the recorded one.
+//! Simulates a recorded episode again with its recorded actions, and compares every number with the recorded one. This is not the
+//! replay that browsers show.
 
 use super::{compare, difference::Difference, episode_reader::RecordedEpisode};
 use crate::{
@@ -363,6 +364,7 @@ fn read_inputs(
         .map(serde_json::from_str::<AgentFault>)
         .transpose()
         .map_err(|error| row_difference(recorded, "fault", error.to_string(), "a fault as JSON"))?;
+    // Only a fault at the agent's start names no episode.
     let started = fault.as_ref().is_none_or(|fault| fault.episode.is_some());
     let text = columns.text("interpolation", 0);
     let wrong = |expected: &str| {

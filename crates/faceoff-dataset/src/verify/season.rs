@@ -5,7 +5,7 @@ use faceoff_types::{Seed, StageId};
 use faceoff_wire::dataset::DatasetManifest;
 use jiff::civil::Date;
 
-/// Published data of a season.
+/// What is published about a season and an evaluation, to be checked against a dataset.
 #[derive(Debug, Clone)]
 pub struct SeasonClaim {
     /// The secret, revealed at the season's close.
@@ -23,6 +23,7 @@ pub struct SeasonClaim {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{claim} does not follow from the season's secret: stated {stated}, derived {derived}")]
 pub struct SeasonMismatch {
+    /// What does not follow: the commitment, or the name of a seed.
     pub claim: &'static str,
     /// The value that the dataset or the organiser states.
     pub stated: String,

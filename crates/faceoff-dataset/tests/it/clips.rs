@@ -33,7 +33,7 @@ fn fixture(name: &str) -> Fixture {
         Some(&clips),
         simulator().as_ref(),
     );
-    assert!(assembled.unwrap().clips);
+    assert!(assembled.unwrap().has_clips);
     Fixture {
         dataset: Dataset::open(&archive, simulator().competition()).unwrap(),
         pack: Pack::open(&clips).unwrap(),
@@ -292,6 +292,6 @@ fn shards_of_the_previous_layout_have_no_clips() {
         simulator().as_ref(),
     )
     .unwrap();
-    assert!(!assembled.clips);
+    assert!(!assembled.has_clips);
     assert!(!clips.exists());
 }

@@ -72,12 +72,12 @@ impl World for PointMass {
     }
 }
 
-/// Starts the mass at a position that depends on seed and episode, or at `start_m`.
-struct Line {
+/// Makes the worlds, each a mass on a line, at a position that depends on seed and episode, or at `start_m`.
+struct PointMassFactory {
     start_m: Option<f64>,
 }
 
-impl WorldFactory for Line {
+impl WorldFactory for PointMassFactory {
     fn seed(&self, task: Task, index: u32) -> Seed {
         Seed::from_number(5).episode(task, index)
     }
@@ -149,12 +149,12 @@ const TIMING: AnswerTiming = AnswerTiming {
 
 /// Plays an episode with an agent that answers with `factor` times the observed position.
 fn play<S: StepSink>(
-    line: &Line,
+    factory: &PointMassFactory,
     layout: ActionLayout,
     factor: f64,
     sink: S,
 ) -> Result<EpisodeOutcome, AgentFaultKind> {
-    let mut running = RunningEpisode::begin(line, REACH, 3, Some(layout), sink).unwrap();
+    let mut running = RunningEpisode::begin(factory, REACH, 3, Some(layout), sink).unwrap();
     loop {
         let action = [factor * running.action_request().unwrap().observation[0]];
         if let Some(outcome) = running.answer(&action, TIMING)? {
@@ -165,9 +165,9 @@ fn play<S: StepSink>(
 
 #[test]
 fn other_world_is_played_and_recorded() {
-    let line = Line { start_m: None };
+    let factory = PointMassFactory { start_m: None };
     let mut recorded = Positions::default();
-    let outcome = play(&line, HALF_DISPLACEMENT, -1.0, &mut recorded).unwrap();
+    let outcome = play(&factory, HALF_DISPLACEMENT, -1.0, &mut recorded).unwrap();
     assert_eq!((outcome.end, outcome.success), (STOPPED, true));
     assert_eq!(outcome.computation_time.max_s, TIMING.computation_time_s);
     assert_eq!(recorded.layout, Some(HALF_DISPLACEMENT));
@@ -177,9 +177,9 @@ fn other_world_is_played_and_recorded() {
     assert_eq!(recorded.next_observed_m, recorded.true_m[1..]);
     assert_eq!(recorded.true_m[1], recorded.true_m[0] / 2.0);
 
-    let again = play(&line, HALF_DISPLACEMENT, -1.0, NullSink).unwrap();
+    let again = play(&factory, HALF_DISPLACEMENT, -1.0, NullSink).unwrap();
     assert_eq!(again, outcome, "the same seed gives the same episode");
-    let idle = play(&line, DISPLACEMENT, 0.0, NullSink).unwrap();
+    let idle = play(&factory, DISPLACEMENT, 0.0, NullSink).unwrap();
     assert_eq!(
         (idle.steps, idle.end, idle.success),
         (MAX_STEPS, EpisodeEnd::HORIZON, false)
@@ -188,29 +188,29 @@ fn other_world_is_played_and_recorded() {
 
 #[test]
 fn other_world_that_diverges_is_an_agent_fault() {
-    let line = Line { start_m: Some(1.0) };
-    let fault = play(&line, DISPLACEMENT, 100.0, NullSink).unwrap_err();
+    let factory = PointMassFactory { start_m: Some(1.0) };
+    let fault = play(&factory, DISPLACEMENT, 100.0, NullSink).unwrap_err();
     let detail = "the mass is lost".to_owned();
     assert_eq!(fault, AgentFaultKind::Diverged { detail });
-    let running = RunningEpisode::begin(&line, REACH, 3, None, NullSink).unwrap();
+    let running = RunningEpisode::begin(&factory, REACH, 3, None, NullSink).unwrap();
     let outcome = running.outcome_after_fault(Phase::StartUp, fault, None);
     assert_eq!((outcome.steps, outcome.success), (0, false));
 }
 
 #[test]
 fn first_observation_that_is_not_finite_is_no_agent_fault() {
-    let line = Line {
+    let factory = PointMassFactory {
         start_m: Some(f64::NAN),
     };
-    let running = RunningEpisode::begin(&line, REACH, 3, None, NullSink).unwrap();
+    let running = RunningEpisode::begin(&factory, REACH, 3, None, NullSink).unwrap();
     let error = running.action_request().unwrap_err();
     assert_eq!(error.episode, 3);
 }
 
 #[test]
 fn world_refuses_tasks_of_other_worlds() {
-    let line = Line { start_m: None };
-    let refused = RunningEpisode::begin(&line, Task::new("hit"), 3, None, NullSink);
+    let factory = PointMassFactory { start_m: None };
+    let refused = RunningEpisode::begin(&factory, Task::new("hit"), 3, None, NullSink);
     let error = refused.unwrap_err().to_string();
     assert_eq!(error, "unknown task \"hit\": expected reach");
 }

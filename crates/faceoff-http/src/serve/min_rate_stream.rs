@@ -11,8 +11,8 @@ use tokio::{
     time::{Instant, Sleep},
 };
 
-/// A stream whose writes fail once the client has read more slowly than the minimum rate for longer than the grace. Only
-/// the time in which data is ready for the client counts, not the time in which the client waits for a response.
+/// A stream whose writes fail once its client lags behind the minimum rate by more than the *grace*, a time. Only the time in
+/// which data is ready for the client counts, not the time in which the client waits for a response.
 #[derive(Debug)]
 pub(super) struct MinRateStream<S> {
     stream: S,

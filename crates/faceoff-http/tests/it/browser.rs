@@ -28,8 +28,9 @@ impl<'a> Browser<'a> {
         };
         let answer = Answer::read(request.send().await.unwrap()).await;
         if let Some(set_cookie) = answer.headers.get("set-cookie") {
-            let pair = set_cookie.to_str().unwrap().split(';').next().unwrap();
-            self.cookie = (!pair.ends_with('=')).then(|| pair.to_owned());
+            let name_and_value = set_cookie.to_str().unwrap().split(';').next().unwrap();
+            // The server deletes a cookie by an empty value.
+            self.cookie = (!name_and_value.ends_with('=')).then(|| name_and_value.to_owned());
         }
         answer
     }

@@ -316,8 +316,8 @@ async fn episode_list_shows_stills_with_long_cache_time() {
         let policy = picture.header("content-security-policy");
         assert!(policy.contains("style-src 'unsafe-inline'"), "{policy}");
         // What the agent observed is not public.
-        let own = day.site.get(address, Some(&day.alpha.token)).await;
-        assert_eq!(own.body, picture.body);
+        let for_own_team = day.site.get(address, Some(&day.alpha.token)).await;
+        assert_eq!(for_own_team.body, picture.body);
         pictures.push(picture.body);
     }
     pictures.dedup();
@@ -351,8 +351,8 @@ async fn frozen_boards_hide_stills() {
     for path in [episode.clone(), format!("{episode}/still.svg")] {
         let hidden = day.site.get(&path, None).await;
         assert_eq!(hidden.status, 409, "{path}: {}", hidden.body);
-        let own = day.site.get(&path, Some(&day.alpha.token)).await;
-        assert_eq!(own.status, 200, "{path}: {}", own.body);
+        let for_own_team = day.site.get(&path, Some(&day.alpha.token)).await;
+        assert_eq!(for_own_team.status, 200, "{path}: {}", for_own_team.body);
     }
 }
 

@@ -14,6 +14,7 @@ use serde_json::{Value, json};
 
 const ACCEPT: &str = "/api/v1/clock/accept";
 
+/// The browser of Grace, an organiser.
 async fn grace(site: &Site) -> Browser<'_> {
     let role = json!({ "role": "organiser", "note": "Grace" });
     Browser::join(site, "Grace", role).await
@@ -50,7 +51,8 @@ async fn main_text(grace: &mut Browser<'_>) -> String {
     texts(&page, "main").concat()
 }
 
-async fn assert_steady(site: &Site, grace: &mut Browser<'_>) {
+/// Asserts that the server reports no step of the system clock, and that there is none to accept.
+async fn assert_no_clock_step(site: &Site, grace: &mut Browser<'_>) {
     site.get("/api/v1/health", None).await.json(200);
     assert!(!main_text(grace).await.contains("system clock"));
     let refused = site.post(ACCEPT, Some(ADMIN), &json!({})).await;
@@ -61,7 +63,7 @@ async fn assert_steady(site: &Site, grace: &mut Browser<'_>) {
 async fn clock_step_is_reported_and_changes_nothing() {
     let (site, mut claim) = running_site().await;
     let mut grace = grace(&site).await;
-    assert_steady(&site, &mut grace).await;
+    assert_no_clock_step(&site, &mut grace).await;
     for (ahead, size) in [(days(5), "432000 s ahead"), (days(-1), "86400 s behind")] {
         site.set_system_clock(ahead);
         for path in ["/api/v1/health", "/readyz"] {
@@ -90,7 +92,7 @@ async fn clock_step_is_reported_and_changes_nothing() {
         let season = site.get("/api/v1/season", None).await.json(200);
         assert_eq!(season["today"], "2026-03-01");
         site.set_system_clock(SignedDuration::ZERO);
-        assert_steady(&site, &mut grace).await;
+        assert_no_clock_step(&site, &mut grace).await;
     }
     // A cutoff that the monotonic clock explains comes in time, although the system clock is wrong.
     site.set_system_clock(days(-1));
@@ -146,7 +148,7 @@ async fn clock_step_is_accepted_on_the_dashboard() {
     let confirmed = [("confirm", "86400 s behind")];
     let done = grace.submit(&link, &confirmed).await;
     assert!(redirect_target(&done).contains("done=clock-accepted"));
-    assert_steady(&site, &mut grace).await;
+    assert_no_clock_step(&site, &mut grace).await;
     assert_eq!(site.clock().now(), time("2026-02-28T10:00:00Z"));
 }
 
@@ -178,7 +180,7 @@ async fn server_start_before_newest_change_is_reported() {
     let confirm = json!({ "confirm": "3600 s behind" });
     assert_eq!(site.post(ACCEPT, Some(ADMIN), &confirm).await.status, 204);
     let mut grace = grace(&site).await;
-    assert_steady(&site, &mut grace).await;
+    assert_no_clock_step(&site, &mut grace).await;
     assert_eq!(site.clock().now(), site.now());
 }
 

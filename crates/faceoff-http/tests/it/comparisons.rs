@@ -146,7 +146,7 @@ async fn episode_of_two_teams_is_replayed_side_by_side() {
 }
 
 #[tokio::test]
-async fn unpaired_evaluations_are_refused_with_the_field() {
+async fn evaluations_that_cannot_be_compared_are_refused() {
     let site = Site::start().await;
     let every_second = |task, e| episode_outcome(task, e, e % 2 == 0, false);
     let [a] = site.run_day(10, [("Alpha", &every_second)]).await;

@@ -49,7 +49,7 @@ async fn team_id(site: &Site, name: &str) -> String {
 }
 
 /// Rank, rank group and team of each row.
-fn places(board: &Value) -> Vec<(u64, u64, String)> {
+fn ranked_rows(board: &Value) -> Vec<(u64, u64, String)> {
     let rows = board["rows"].as_array().unwrap().iter();
     rows.map(|row| {
         let number = |key: &str| row[key].as_u64().unwrap();
@@ -59,8 +59,8 @@ fn places(board: &Value) -> Vec<(u64, u64, String)> {
     .collect()
 }
 
-fn team_names(places: &[(u64, u64, String)]) -> Vec<&str> {
-    places.iter().map(|(_, _, team)| team.as_str()).collect()
+fn team_names(rows: &[(u64, u64, String)]) -> Vec<&str> {
+    rows.iter().map(|(_, _, team)| team.as_str()).collect()
 }
 
 #[tokio::test]
@@ -104,7 +104,7 @@ async fn board_without_divisions_is_unchanged() {
     let alpha = [("Alpha", result([0.9, 0.9, 0.9], 10.0))];
     site.add_ranked_teams(&alpha).await;
     let board = site.get("/api/v1/board", None).await.json(200);
-    assert_eq!(places(&board), [(1, 1, "Alpha".to_owned())]);
+    assert_eq!(ranked_rows(&board), [(1, 1, "Alpha".to_owned())]);
     assert!(!board.to_string().contains("division"), "{board}");
     let page = site.get("/", None).await.body.to_lowercase();
     assert!(!page.contains("division"));
@@ -123,7 +123,7 @@ async fn board_without_divisions_is_unchanged() {
 async fn board_of_a_division_ranks_its_teams() {
     let site = season_with_divisions().await;
     let all_teams = site.get("/api/v1/board", None).await.json(200);
-    assert_eq!(team_names(&places(&all_teams)), ["A", "B", "C", "D"]);
+    assert_eq!(team_names(&ranked_rows(&all_teams)), ["A", "B", "C", "D"]);
     assert!(all_teams.get("division").is_none());
     let divisions: Vec<_> = all_teams["rows"].as_array().unwrap().iter().collect();
     let divisions: Vec<_> = divisions.iter().map(|row| row.get("division")).collect();
@@ -142,18 +142,18 @@ async fn board_of_a_division_ranks_its_teams() {
     ] {
         let board = site.get(path, None).await.json(200);
         assert_eq!(board["division"], "Bachelor students", "{path}");
-        let places = places(&board);
-        assert_eq!(team_names(&places), ["A", "C"], "{path}");
-        let ranks: Vec<_> = places.iter().map(|(rank, ..)| *rank).collect();
+        let rows = ranked_rows(&board);
+        assert_eq!(team_names(&rows), ["A", "C"], "{path}");
+        let ranks: Vec<_> = rows.iter().map(|(rank, ..)| *rank).collect();
         assert_eq!(ranks, [1, 2], "{path}");
         assert_eq!(
-            places[0].1, 1,
+            rows[0].1, 1,
             "{path}: rank groups are counted within the division"
         );
     }
 
     let open = site.get("/api/v1/board?division=open", None).await;
-    assert_eq!(places(&open.json(200)), [(1, 1, "B".to_owned())]);
+    assert_eq!(ranked_rows(&open.json(200)), [(1, 1, "B".to_owned())]);
 
     for path in ["/api/v1/board", "/api/v1/board/prepare"] {
         let refused = site.get(&format!("{path}?division=Pupils"), None).await;
@@ -177,7 +177,7 @@ async fn board_of_a_division_ranks_its_teams() {
     ] {
         let path = format!("/api/v1/board?division={division}");
         let board = site.get(&path, None).await.json(200);
-        assert_eq!(team_names(&places(&board)), remaining);
+        assert_eq!(team_names(&ranked_rows(&board)), remaining);
         let listed = board["disqualified"].as_array().unwrap();
         assert_eq!(listed.len(), disqualified, "{division}");
     }

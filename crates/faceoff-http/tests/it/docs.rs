@@ -290,7 +290,7 @@ async fn search_finds_sections_and_marks_words() {
 }
 
 #[tokio::test]
-async fn search_knows_questions_forms_typos_and_synonyms() {
+async fn search_handles_questions_word_forms_typos_synonyms() {
     let site = Site::start().await;
     for (query, expected) in [
         ("how do I submit", "/docs/start"),

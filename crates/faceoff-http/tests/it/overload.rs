@@ -122,8 +122,8 @@ async fn last_streams_are_kept_for_teams_and_organisers() {
     let team = site.team("Alpha").await;
     let path = "/api/v1/events/stream";
     let mut open = Vec::new();
-    for (token, places) in [(None, 6), (Some(team.token.as_str()), 1), (Some(ADMIN), 1)] {
-        for _ in 0..places {
+    for (token, streams) in [(None, 6), (Some(team.token.as_str()), 1), (Some(ADMIN), 1)] {
+        for _ in 0..streams {
             let mut stream = Stream::open(&site, path, token, None).await;
             assert_eq!(stream.next().await.unwrap().name, "now");
             open.push(stream);

@@ -93,7 +93,10 @@ async fn page_with(
         selected.cloned().collect::<Vec<_>>()
     };
     let phase = view.summary.phase;
-    let can_start_round = matches!(phase, TournamentPhase::Open | TournamentPhase::Between);
+    let can_start_round = matches!(
+        phase,
+        TournamentPhase::Open | TournamentPhase::BetweenRounds
+    );
     let has_groups = matches!(view.rules.format, TournamentFormat::Groups { .. });
     let progress = tournament::progress(&state);
     let teams = view.entrants.iter();
@@ -109,11 +112,11 @@ async fn page_with(
         to_rerun: select(|state| matches!(state, GameState::Void | GameState::Failed)),
         with_result: select(|state| matches!(state, GameState::Played { .. })),
         is_closed: phase == TournamentPhase::Closed,
-        is_round_running: phase == TournamentPhase::Round,
+        is_round_running: phase == TournamentPhase::RoundRunning,
         can_start_round,
-        can_close: can_start_round || phase == TournamentPhase::Played,
+        can_close: can_start_round || phase == TournamentPhase::AllRoundsPlayed,
         can_enter: phase == TournamentPhase::Open
-            || phase == TournamentPhase::Between && !has_groups,
+            || phase == TournamentPhase::BetweenRounds && !has_groups,
         form,
         view,
     };

@@ -11,7 +11,7 @@ use crate::{
         visibility::Visibility,
     },
 };
-use faceoff_api::views::clips::{EpisodesView, TimeBinView};
+use faceoff_api::views::episodes::{EpisodesView, TimeBinView};
 use faceoff_replay::{ClipIndex, ClipKey, EpisodeIndexEntry, Pack};
 use faceoff_store::{Artifacts, Evaluation, EvaluationState};
 use faceoff_types::{EvaluationId, Task, TaskMap};

@@ -100,9 +100,9 @@ pub fn of_tournament(state: &TournamentState) -> Option<TournamentDecisionKind> 
     match (tournament::phase(state), to_rerun.count()) {
         (TournamentPhase::Closed, _) => None,
         (_, games @ 1..) => Some(TournamentDecisionKind::Rerun { games }),
-        (TournamentPhase::Between, 0) => Some(TournamentDecisionKind::StartRound),
-        (TournamentPhase::Played, 0) => Some(TournamentDecisionKind::Close),
-        (TournamentPhase::Open | TournamentPhase::Round, 0) => None,
+        (TournamentPhase::BetweenRounds, 0) => Some(TournamentDecisionKind::StartRound),
+        (TournamentPhase::AllRoundsPlayed, 0) => Some(TournamentDecisionKind::Close),
+        (TournamentPhase::Open | TournamentPhase::RoundRunning, 0) => None,
     }
 }
 

@@ -208,11 +208,11 @@ pub(super) fn phase(state: &TournamentState) -> TournamentPhase {
     } else if state.games.iter().any(|game| state.needs_result(game))
         || state.rounds.iter().any(|round| round.over_at.is_none())
     {
-        TournamentPhase::Round
+        TournamentPhase::RoundRunning
     } else if state.rounds.len() < last_round.get() as usize {
-        TournamentPhase::Between
+        TournamentPhase::BetweenRounds
     } else {
-        TournamentPhase::Played
+        TournamentPhase::AllRoundsPlayed
     }
 }
 
@@ -244,14 +244,14 @@ fn next_text(state: &TournamentState, phase: TournamentPhase) -> String {
     let next_number = state.rounds.len() + 1;
     match phase {
         TournamentPhase::Closed => "The tournament is closed.".to_owned(),
-        TournamentPhase::Played => {
+        TournamentPhase::AllRoundsPlayed => {
             "All rounds have been played; the organisers still have to close the tournament."
                 .to_owned()
         }
-        TournamentPhase::Open | TournamentPhase::Between => format!(
+        TournamentPhase::Open | TournamentPhase::BetweenRounds => format!(
             "An organiser starts round {next_number} of {last_round}; the active submissions of that moment play the whole round."
         ),
-        TournamentPhase::Round => running_round_text(state),
+        TournamentPhase::RoundRunning => running_round_text(state),
     }
 }
 

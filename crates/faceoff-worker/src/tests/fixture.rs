@@ -261,7 +261,7 @@ impl Evaluator for ScriptedEvaluator {
                 bytes: bytes.len() as u64,
                 blake3: blake3::hash(bytes.as_bytes()).to_string(),
             },
-            clips: true,
+            has_clips: true,
         })
     }
 }

@@ -7,7 +7,7 @@ use crate::field::{Field, Vec2};
 use crate::keeper::Keeper;
 use crate::motion::{Pace, Target};
 use crate::puck::{DRAG, MALLET_RESTITUTION};
-use crate::scene::{Scene, lean_side, waypoint};
+use crate::scene::{Scene, elbow_side, waypoint};
 use crate::skills::aim::strike_towards;
 
 /// Duration of the run-up, seconds.
@@ -80,9 +80,9 @@ pub fn replan(scene: &Scene<'_>, plan: &Plan, time_left: f64, speed: Option<f64>
     }
 }
 
-/// The earliest possible nudge.
-pub fn best_nudge(scene: &Scene<'_>) -> Option<Plan> {
-    let side = lean_side(scene.puck.pos);
+/// The earliest possible nudge; `None` if there is none in the next 1.3 seconds.
+pub fn earliest_nudge(scene: &Scene<'_>) -> Option<Plan> {
+    let side = elbow_side(scene.puck.pos);
     (0..20)
         .map(|k| 0.2 + 0.06 * f64::from(k))
         .find_map(|time_left| {
@@ -131,7 +131,7 @@ fn plan_nudge(scene: &Scene<'_>, time_left: f64, side: Side) -> Option<Plan> {
 /// The strike with the highest chance of a goal over contact times and aims.
 pub fn best_plan(scene: &Scene<'_>) -> Option<Plan> {
     let mut best: Option<Plan> = None;
-    let side = lean_side(scene.puck.pos);
+    let side = elbow_side(scene.puck.pos);
     let mut time_left = RUN_UP_TIME + 0.1;
     let aims = candidate_aims(scene.keeper);
     // Time between the compared contacts, seconds. In a game there are four times as many aims, and another shot is possible soon.
@@ -174,7 +174,7 @@ fn is_reachable(scene: &Scene<'_>, plan: &Plan, time_left: f64) -> bool {
 
 /// Length of the run-up along `direction` to `contact` that fits into the mallet's area, metres.
 fn run_up_room(field: &Field, contact: Vec2, direction: Vec2) -> f64 {
-    let limit = |pos: f64, step: f64, low: f64, high: f64| {
+    let length_to_bound = |pos: f64, step: f64, low: f64, high: f64| {
         if step > 1e-6 {
             (pos - low) / step
         } else if step < -1e-6 {
@@ -184,8 +184,9 @@ fn run_up_room(field: &Field, contact: Vec2, direction: Vec2) -> f64 {
         }
     };
     let y = field.mallet_y_max();
-    let x = limit(contact.x, direction.x, field.mallet_x_min(), 0.0);
-    x.min(limit(contact.y, direction.y, -y, y)).clamp(0.0, 1.0)
+    let x = length_to_bound(contact.x, direction.x, field.mallet_x_min(), 0.0);
+    x.min(length_to_bound(contact.y, direction.y, -y, y))
+        .clamp(0.0, 1.0)
 }
 
 /// A shot in `time_left` seconds that sends the puck to `aim` on the goal line. Without `speed` it is as fast as run-up and arm allow.

@@ -214,6 +214,7 @@ fn chance_past_opponent(field: &Field, recent: &RecentPositions, struck: &Puck, 
     let to_keeper = recent.pos - bounce_point;
     let distance = to_keeper.norm();
     let radius = field.contact_distance() + 0.004;
+    // A keeper at the bounce point or behind it covers an unknown part: a rough guess.
     if distance <= radius || to_keeper.x <= 0.0 {
         return 0.5 * reaches_goal;
     }

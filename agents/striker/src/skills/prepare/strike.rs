@@ -120,7 +120,7 @@ fn strike_value(
 fn strike_outcome(field: &Field, mut puck: Puck, normal: Vec2, velocity: Vec2) -> f64 {
     let speed = velocity.norm();
     let direction = velocity / speed;
-    // Contact, braking and a short rest of the mallet, in substeps.
+    // Contact, braking and a short rest of the mallet, in substeps, until puck and mallet are apart.
     let mut mallet = puck.pos - (field.contact_distance() + 1e-4) * normal;
     let mut mallet_speed = speed;
     let mut time = 0.0;
@@ -136,9 +136,9 @@ fn strike_outcome(field: &Field, mut puck: Puck, normal: Vec2, velocity: Vec2) -
             return end;
         }
         let gap = (puck.pos - mallet).norm() - field.contact_distance();
-        let opening = (puck.vel - mallet_speed * direction).dot(&(puck.pos - mallet)) > 0.0;
+        let is_separating = (puck.vel - mallet_speed * direction).dot(&(puck.pos - mallet)) > 0.0;
         if gap > 0.03
-            && opening
+            && is_separating
             && (mallet_speed == 0.0 || gap > 0.1)
             && puck.next_rim(field).is_none_or(|(t, _)| t > 0.02)
         {

@@ -53,6 +53,7 @@ impl FromArgMatches for OrNull<Schedule> {
         let schedule = match (options.daily, options.cron) {
             (Some(time_of_day), _) => Schedule::daily(time_of_day),
             (None, Some(schedule)) => schedule,
+            // Then --days-off is given: clap calls this only if one of the options is.
             (None, None) => {
                 return Err(clap::Error::raw(
                     ErrorKind::MissingRequiredArgument,

@@ -30,9 +30,9 @@ pub(in crate::commands) fn tournament_list(tournaments: &[TournamentSummary]) ->
 fn phase_text(summary: &TournamentSummary) -> String {
     let phase = match summary.phase {
         TournamentPhase::Open => "open",
-        TournamentPhase::Round => "round running",
-        TournamentPhase::Between => "between rounds",
-        TournamentPhase::Played => "all rounds finished",
+        TournamentPhase::RoundRunning => "round running",
+        TournamentPhase::BetweenRounds => "between rounds",
+        TournamentPhase::AllRoundsPlayed => "all rounds finished",
         TournamentPhase::Closed => "closed",
     };
     let paused = match (&summary.paused, summary.phase) {

@@ -1,5 +1,5 @@
-//! Episodes of an evaluation and their computation times. A *clip* is the recorded motion of an episode. Motion and outcome
-//! are public once the day is released. Observations, actions, computation times and faults need access to the dataset.
+//! Outcomes of an evaluation's episodes, and a histogram of computation times. Outcomes are public once the day is released.
+//! Computation times and faults need access to the dataset.
 
 use faceoff_replay::EpisodeIndexEntry;
 use faceoff_types::Task;
