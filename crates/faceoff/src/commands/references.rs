@@ -140,14 +140,18 @@ pub(super) async fn find_evaluation(client: &Client, text: &str) -> anyhow::Resu
 /// The evaluation of a team on a day: one of those that the caller may see by a token, even before their release, or else one on a
 /// public board of that day. Boards of the current stage are searched first.
 async fn find_by_day(client: &Client, team: &str, day: Date) -> anyhow::Result<EvaluationId> {
-    let visible =
-        none_on_expected_error(client.evaluations(Some(day)).await, is_access_refused)?.unwrap_or_default();
+    let visible = none_on_expected_error(client.evaluations(Some(day)).await, is_access_refused)?
+        .unwrap_or_default();
     let has_name = |name: &str| name.to_lowercase() == team.to_lowercase();
-    if let Some(evaluation) = visible.iter().find(|found| has_name(found.team_name.as_str())) {
+    if let Some(evaluation) = visible
+        .iter()
+        .find(|found| has_name(found.team_name.as_str()))
+    {
         return Ok(evaluation.id);
     }
     let mut teams_with_results = BTreeSet::new();
-    let stages = none_on_expected_error(client.stages().await, is_access_refused)?.unwrap_or_default();
+    let stages =
+        none_on_expected_error(client.stages().await, is_access_refused)?.unwrap_or_default();
     let other_stages = stages.iter().map(|stage| Some(stage.id));
     for stage in iter::once(None).chain(other_stages) {
         // With `Latest` the board has each team's newest result up to the day, so its day may be an earlier one.

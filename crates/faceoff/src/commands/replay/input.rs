@@ -33,7 +33,9 @@ impl Input {
             false => Vec::new(),
         };
         if !series.is_empty() {
-            return Ok(Self::Game(path.join(choose_game_folder(path, &series, game)?)));
+            return Ok(Self::Game(
+                path.join(choose_game_folder(path, &series, game)?),
+            ));
         }
         if game.is_some() {
             bail!(
@@ -55,7 +57,11 @@ impl Input {
 }
 
 /// The folder of the chosen game of a series.
-fn choose_game_folder<'a>(path: &Path, series: &'a [String], game: Option<u32>) -> anyhow::Result<&'a str> {
+fn choose_game_folder<'a>(
+    path: &Path,
+    series: &'a [String],
+    game: Option<u32>,
+) -> anyhow::Result<&'a str> {
     let count = series.len();
     let range = match (&series[0], &series[count - 1]) {
         (_, _) if count == 1 => format!("it has 1 game, {}: --game 1", series[0]),

@@ -123,7 +123,12 @@ impl VideoOptions {
 
 impl Video {
     /// Writes the video of a scene. `default_span` is the first and the last sample without `--from` and `--to`.
-    pub fn write(&self, scene: &Scene, default_span: [usize; 2], file: &Path) -> anyhow::Result<()> {
+    pub fn write(
+        &self,
+        scene: &Scene,
+        default_span: [usize; 2],
+        file: &Path,
+    ) -> anyhow::Result<()> {
         let frames = self.frames(scene, default_span)?;
         let backdrop = scene.backdrop()?;
         let mut encoder = match self.format {

@@ -1,4 +1,4 @@
-//! Text of games. A *matchday* is a part of a round in which each team plays at most one pairing.
+//! Text of games. A *matchday* is a part of a round in which no team has two pairings.
 
 use crate::commands::output::{exact_time_text, lines_or};
 use faceoff_api::views::{
@@ -95,7 +95,7 @@ pub(in crate::commands) fn game_text(game: &GameView) -> String {
         PurposeView::Round {
             round,
             matchday,
-            // The number of the pairing between the same teams in the round.
+            // The number of the pairing of the two teams in the round's draw.
             meeting,
             second_half,
         } => {
