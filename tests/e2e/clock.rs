@@ -1,5 +1,5 @@
-//! A system clock that is set while the server runs, or while it does not. After such a *step* the server's time goes on as before,
-//! and the server reports the step until the clock is right again or an organiser accepts it.
+//! A system clock that is set while the server runs, or while it does not. After such a *step* the server's time goes on as before.
+//! The server reports the step until the clock is right again or an organiser accepts it.
 
 use crate::{CONFIG, Team, start_day};
 use faceoff_tests::{

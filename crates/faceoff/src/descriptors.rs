@@ -11,7 +11,8 @@ const MAX_LIMIT: u64 = 1 << 16;
 /// Descriptors of the server itself: database, log, async runtime, listener.
 const SERVER_DESCRIPTORS: u64 = 64;
 /// Most descriptors of a slot. Each of its two agents has sockets, kernel counters (two files for each of its first 16
-/// threads), files for its termination and up to 32 files for whose locks it waits; the slot has an unpacked bundle, recordings and datasets.
+/// threads), files for its termination and up to 32 files for whose locks it waits. The slot has an unpacked bundle, recordings
+/// and datasets.
 const DESCRIPTORS_PER_SLOT: u64 = 230;
 /// Descriptors per connection: the socket, and a file that is sent, or two handles of a file that is received.
 const DESCRIPTORS_PER_CONNECTION: u64 = 3;

@@ -48,7 +48,7 @@ enum Command {
     Play(commands::play::PlayCommand),
     /// Compare two evaluations on the same episodes.
     Compare(commands::compare::CompareCommand),
-    /// Draw an episode of a dataset as a page or picture.
+    /// Draw a recorded game, or an episode of a dataset, as a page, picture or video.
     Replay(commands::replay::ReplayCommand),
     /// Simulate a dataset or a game again and compare every state and score.
     Verify(commands::verify::VerifyCommand),

@@ -137,8 +137,8 @@ pub(super) async fn find_evaluation(client: &Client, text: &str) -> anyhow::Resu
     }
 }
 
-/// The evaluation of a team on a day: one of those that the caller may see by a token, even before their release, or else one on a
-/// public board of that day. Boards of the current stage are searched first.
+/// The evaluation of a team on a day. First it is looked for among those that the caller may see by a token, even before their release.
+/// Then follow the public boards of that day, that of the current stage first.
 async fn find_by_day(client: &Client, team: &str, day: Date) -> anyhow::Result<EvaluationId> {
     let visible = none_on_expected_error(client.evaluations(Some(day)).await, is_access_refused)?
         .unwrap_or_default();

@@ -1,9 +1,9 @@
-//! The server's clock. It follows the system clock as long as that advances like Linux' monotonic clock, which cannot be set. After a
-//! *step* (the system clock was set) the server's time continues by the monotonic clock, until the system clock is right again or an
-//! organiser accepts the step.
+//! The server's clock. It follows the system clock as long as that advances like Linux' monotonic clock, which cannot be set. If the
+//! system clock is set (a *step*), the server's time continues by the monotonic clock. This lasts until the system clock is right again
+//! or an organiser accepts the step.
 //!
-//! A file in the data folder records the time at which the monotonic clock was zero. So a step is also noticed if the system clock
-//! was set while the server did not run, as long as the machine was not restarted.
+//! A file in the data folder records the time at which the monotonic clock was zero. So the server also
+//! notices a step that happened while it did not run, unless the machine was restarted.
 
 use anyhow::Context;
 use faceoff_store::Store;
