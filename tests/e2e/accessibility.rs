@@ -2,7 +2,7 @@
 //! axe-core reports no violation, no page is wider than its window, and no script fails.
 
 use crate::{
-    axe::{axe_script, faults},
+    axe::{axe_script, page_defects},
     commands::admin,
     dashboards::{InvitedUser, sign_in},
     replay::released_evaluation,
@@ -13,7 +13,7 @@ use faceoff_tests::{
 };
 use serde_json::{Value, json};
 
-/// Opens a page and returns its faults.
+/// Opens a page, waits until its replays are loaded, and returns its defects.
 fn check_page(page: &Page, server: &Server, axe_script: &str, path: &str) -> Vec<String> {
     page.set_view(View::DESKTOP);
     page.go_to(&format!("{}{path}", server.url));
@@ -22,7 +22,7 @@ fn check_page(page: &Page, server: &Server, axe_script: &str, path: &str) -> Vec
     page.wait_until(
         "[...document.querySelectorAll('section.replay')].every(replay => replay.dataset.state == 'ready')",
     );
-    faults(page, axe_script, path)
+    page_defects(page, axe_script, path)
 }
 
 #[test]
@@ -40,7 +40,7 @@ fn public_pages_follow_accessibility_rules() {
     let episodes = format!("{evaluation_page}/episodes");
     let replay = format!("{evaluation_page}/episodes/defend/0");
     let embedded = format!("{replay}/embed");
-    let mut all_faults = Vec::new();
+    let mut all_defects = Vec::new();
     let page = browser.open(&format!("{}/", server.url));
     for path in [
         "/",
@@ -65,9 +65,9 @@ fn public_pages_follow_accessibility_rules() {
         "/sign-in",
         "/register",
     ] {
-        all_faults.extend(check_page(&page, &server, &axe_script, path));
+        all_defects.extend(check_page(&page, &server, &axe_script, path));
     }
-    assert!(all_faults.is_empty(), "{}", all_faults.join("\n"));
+    assert!(all_defects.is_empty(), "{}", all_defects.join("\n"));
 }
 
 #[test]
@@ -102,7 +102,7 @@ fn dashboards_follow_accessibility_rules() {
     // An ablation evaluates a submission with each perturbation of the simulation alone.
     admin(&server, &["order-ablation", &submission, "--episodes", "1"]).expect_success();
     let browser = Browser::start(scratch.path());
-    let mut all_faults = Vec::new();
+    let mut all_defects = Vec::new();
     let member = sign_in(&browser, &server, InvitedUser::member("Ada", &team));
     for path in [
         "/dashboard",
@@ -112,7 +112,7 @@ fn dashboards_follow_accessibility_rules() {
         "/dashboard/settings",
         "/account",
     ] {
-        all_faults.extend(check_page(&member, &server, &axe_script, path));
+        all_defects.extend(check_page(&member, &server, &axe_script, path));
     }
     let organiser = sign_in(&browser, &server, InvitedUser::organiser("Grace"));
     let cup = server.post(
@@ -143,7 +143,7 @@ fn dashboards_follow_accessibility_rules() {
         &format!("/organiser/decide/void/{id}"),
         &format!("/submissions/{submission}/ablation"),
     ] {
-        all_faults.extend(check_page(&organiser, &server, &axe_script, path));
+        all_defects.extend(check_page(&organiser, &server, &axe_script, path));
     }
-    assert!(all_faults.is_empty(), "{}", all_faults.join("\n"));
+    assert!(all_defects.is_empty(), "{}", all_defects.join("\n"));
 }

@@ -42,7 +42,7 @@ const FAULTY_AGENTS: [(&str, &str, &str); 6] = [
 #[test]
 fn faulty_agent_gets_reason_and_log_without_affecting_others() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    // 256 MiB, less than the agent named glutton allocates.
+    // 256 MiB: the agent named glutton allocates 1 GiB.
     let config = format!("{CONFIG}\n[limits]\nmemory_bytes = 268435456\n");
     let server = Server::start(&scratch.path().join("data"), &config);
 

@@ -6,7 +6,7 @@ mod crate_table;
 mod import_cycles;
 mod imports;
 mod levels;
-mod line;
+mod platform_line;
 
 use import_cycles::find_cycles;
 use std::{collections::BTreeSet, fs, path::Path};
@@ -88,39 +88,43 @@ fn modules_use_only_their_own_and_lower_levels() {
 
 #[test]
 fn only_listed_modules_of_the_platform_know_air_hockey() {
-    let platform = line::crates_on_side("platform");
-    let air_hockey = line::crates_on_side("air hockey");
-    let test_crates = line::crates_on_side("tests");
-    let modules = line::modules();
+    let platform = platform_line::crates_on_side("platform");
+    let air_hockey = platform_line::crates_on_side("air hockey");
+    let test_crates = platform_line::crates_on_side("tests");
+    let modules = platform_line::modules();
     let mut problems = Vec::new();
     for member in crate_table::members() {
         let name = &member.name;
         let sides = [&platform, &air_hockey, &test_crates];
-        let is_once = sides.iter().filter(|side| side.contains(name)).count();
-        assert_eq!(is_once, 1, "{name} is on one side of the line");
-        let listed: &[String] = modules.get(name).map_or(&[], Vec::as_slice);
+        let side_count = sides.iter().filter(|side| side.contains(name)).count();
+        assert_eq!(side_count, 1, "{name} is on one side of the line");
+        let listed_modules: &[String] = modules.get(name).map_or(&[], Vec::as_slice);
         if !platform.contains(name) {
-            assert!(listed.is_empty(), "{name} is not of the platform");
+            assert!(listed_modules.is_empty(), "{name} is not of the platform");
             continue;
         }
-        let findings = line::findings(&member.folder.join("src"), &air_hockey);
-        let is_listed =
-            |finding: &&line::Finding| listed.iter().any(|module| finding.is_in(module));
+        let findings = platform_line::findings(&member.folder.join("src"), &air_hockey);
+        let is_listed = |finding: &&platform_line::Finding| {
+            listed_modules.iter().any(|module| finding.is_in(module))
+        };
         let unlisted = findings.iter().filter(|finding| !is_listed(finding));
         problems.extend(unlisted.map(|finding| format!("{name}: {finding}")));
-        let is_clean = |module: &&String| !findings.iter().any(|finding| finding.is_in(module));
-        let clean = listed.iter().filter(is_clean);
-        problems.extend(clean.map(|module| format!("{name}: {module} has no word of air hockey")));
-        // Only listed modules use a crate of air hockey.
+        let has_no_finding =
+            |module: &&String| !findings.iter().any(|finding| finding.is_in(module));
+        let needlessly_listed = listed_modules.iter().filter(has_no_finding);
+        problems.extend(
+            needlessly_listed.map(|module| format!("{name}: {module} has no word of air hockey")),
+        );
+        // A dependency on a crate of air hockey must be used in a module, where the findings above show it.
         let is_used = |dependency: &str| {
             let name = dependency.replace('-', "_");
             findings.iter().any(|finding| finding.word == name)
         };
-        let crossing = member
+        let unused = member
             .dependencies
             .iter()
             .filter(|dependency| air_hockey.contains(*dependency) && !is_used(dependency));
-        problems.extend(crossing.map(|dependency| format!("{name} depends on {dependency}")));
+        problems.extend(unused.map(|dependency| format!("{name} depends on {dependency}")));
     }
     let unknown = modules.keys().filter(|name| !platform.contains(*name));
     problems.extend(unknown.map(|name| format!("{name} is no crate of the platform")));
@@ -133,7 +137,8 @@ fn only_listed_modules_of_the_platform_know_air_hockey() {
 #[test]
 fn word_and_crate_of_air_hockey_are_found() {
     let crates = ["faceoff-sim".to_owned()].into();
-    let findings = |name, text: &str| line::findings(write_crate(&[(name, text)]).path(), &crates);
+    let findings =
+        |name, text: &str| platform_line::findings(write_crate(&[(name, text)]).path(), &crates);
     let words = |text: &str| -> Vec<String> {
         let found = findings("lib.rs", text);
         found.iter().map(ToString::to_string).collect()
@@ -171,7 +176,7 @@ fn word_and_crate_of_air_hockey_are_found() {
         ("a/d.rs", "fn puck() {}"),
         ("b.rs", "fn goal() {}"),
     ]);
-    let found = line::findings(with_test_module.path(), &crates);
+    let found = platform_line::findings(with_test_module.path(), &crates);
     let found: Vec<String> = found.iter().map(ToString::to_string).collect();
     assert_eq!(found, ["\"puck\" in a/d.rs"]);
     let [finding] = &findings("game/live.rs", "pub fn foul() {}")[..] else {

@@ -1,4 +1,4 @@
-//! Faults of a page in a real browser: violations of accessibility rules, which the library axe-core reports, overflowing
+//! Defects of a page in a real browser: violations of accessibility rules, which the library axe-core reports, overflowing
 //! elements, and errors on the console.
 
 use faceoff_tests::{
@@ -39,25 +39,25 @@ pub fn axe_script() -> String {
     })
 }
 
-/// The faults of an open page in all views; `path` names the page in their descriptions.
-pub fn faults(page: &Page, axe_script: &str, path: &str) -> Vec<String> {
-    let mut faults = Vec::new();
+/// The defects of an open page in all views; `path` names the page in their descriptions.
+pub fn page_defects(page: &Page, axe_script: &str, path: &str) -> Vec<String> {
+    let mut defects = Vec::new();
     let _ = page.evaluate(&format!("{axe_script};1"));
     for view in VIEWS {
         page.set_view(view);
         if page.overflow() != 0 {
             let elements = page.evaluate(LIST_WIDE_ELEMENTS);
             let width = view.width;
-            faults.push(format!("{path} is wider than {width} pixels: {elements}"));
+            defects.push(format!("{path} is wider than {width} pixels: {elements}"));
         }
-        // The results of the rules depend only on the colour scheme and on whether the window is narrow.
+        // The accessibility rules depend only on the colour scheme and on whether the window is narrow, so not all views are needed.
         if view == View::DESKTOP || view.dark {
             let list = page.evaluate(LIST_VIOLATIONS);
             let list = list.as_array().expect("axe returns a list");
             let violations = list
                 .iter()
                 .map(|violation| format!("{path} {}: {violation}", view.width));
-            faults.extend(violations);
+            defects.extend(violations);
         }
     }
     for width in WIDTHS {
@@ -67,9 +67,9 @@ pub fn faults(page: &Page, axe_script: &str, path: &str) -> Vec<String> {
         });
         if page.overflow() != 0 {
             let elements = page.evaluate(LIST_WIDE_ELEMENTS);
-            faults.push(format!("{path} is wider than {width} pixels: {elements}"));
+            defects.push(format!("{path} is wider than {width} pixels: {elements}"));
         }
     }
-    faults.extend(page.console_errors());
-    faults
+    defects.extend(page.console_errors());
+    defects
 }

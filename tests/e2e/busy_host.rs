@@ -231,7 +231,7 @@ fn separate_and_combined_loads_change_no_result() {
 /// A thread's name and its CPUs.
 type ThreadCpus = (String, String);
 
-/// The server's threads with their CPUs: those of ordinary priority, and those of lower priority.
+/// The server's threads with their CPUs: first those of ordinary priority, then those of lower priority.
 fn threads_of(server: &Server) -> (Vec<ThreadCpus>, Vec<ThreadCpus>) {
     let tasks =
         fs::read_dir(format!("/proc/{}/task", server.process_id())).expect("the server runs");
@@ -307,7 +307,8 @@ fn http_threads_yield_and_avoid_agent_cpus() {
         threads = threads_of(&server).0;
     }
     assert!(!has_service_thread(&threads), "{threads:?}");
-    // With more than two CPUs, the HTTP threads avoid those of the agent and the simulator.
+    // With more than two CPUs, the HTTP threads avoid those of the agent and the simulator. With two, the agent has one, and the
+    // simulator shares the other with the HTTP threads.
     let cpus = thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let http_cpus = cpus_of(&low_priority, "http");
     assert!(

@@ -91,6 +91,7 @@ fn agent_leaves_no_trace_visible_to_another_teams_agent() {
     // The first agent uses locks, leases, hints, notifications, advice, non-blocking reads, counters, terminals, kernel
     // objects and files, on a file that both can read. The second makes the same calls, and gets the same answers as the first.
     let shared_file = "library";
+    // The first run of the program leaves traces, the second looks for them. Both report the answers of the kernel.
     let [first_agent, second_agent] = ["leave", "look"].map(|action| {
         let arguments = [PROCESS_MARK, shared_file, action];
         let folder = reporting_bundle(scratch.path(), action, "covert_channel.py", &arguments);
@@ -201,7 +202,8 @@ fn event_storm_of_agent_is_charged_to_agent() {
             result["timing"]["host_noise_reruns"], 0,
             "{name}: {result:#}"
         );
-        // All of the time is charged, except for host interference that is proven.
+        // All of the time is charged, except for host interference that is proven. `host_noise_reruns` counts episodes that were
+        // repeated because of host interference, and `longest_stall_s` is the longest one.
         let charged_s = &result["tasks"]["hit"]["computation_time_s"]["max"];
         let host_s = &result["timing"]["longest_stall_s"];
         let (charged_s, host_s) = (charged_s.as_f64(), host_s.as_f64());

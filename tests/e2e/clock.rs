@@ -1,4 +1,5 @@
-//! A system clock that is set while the server runs, or while it does not.
+//! A system clock that is set while the server runs, or while it does not. After such a *step* the server's time goes on as before.
+//! The server reports the step until the clock is right again or an organiser accepts it.
 
 use crate::{CONFIG, Team, start_day};
 use faceoff_tests::{
@@ -17,7 +18,7 @@ fn submit_valid(server: &Server, team: &Team, folder: &Path, name: &str) -> Valu
     submission
 }
 
-/// Asserts that the health is not ready, and returns the reason.
+/// Asserts that the server reports a clock that was set, and returns the description.
 fn health_problem(server: &Server) -> String {
     let health = server.get("/api/v1/health", None);
     assert_eq!(health.status(), 503);
@@ -41,6 +42,7 @@ fn running_server_continues_its_time_after_a_step() {
     let team = Team::create(&server, "Alpha");
     assert_healthy(&server);
 
+    // Five days are 432000 s.
     clock.set(5 * 86_400);
     server.wait_for_log("432000 s ahead", 1);
     assert!(health_problem(&server).contains("432000 s ahead"));
@@ -63,6 +65,7 @@ fn running_server_continues_its_time_after_a_step() {
     assert_healthy(&server);
 }
 
+/// The newest change is the newest event in the database. Its time shows that the clock is wrong, even after a restart of the machine.
 #[test]
 fn server_starts_with_a_clock_before_the_newest_change() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
@@ -82,13 +85,13 @@ fn server_starts_with_a_clock_before_the_newest_change() {
     let bundle = faceoff_tests::bundle::pack(&bundle);
     let id = team.upload(&server, bundle);
     server.kill();
-    // As after a start of the machine.
+    // The file has the readings of the monotonic clock, which mean nothing after a restart of the machine. Removing it imitates one.
     fs::remove_file(data.join("clock.json")).expect("the server has recorded its clock");
     clock.set(-86_400);
     let server = Server::start_with_environment(&data, CONFIG, &clock.environment());
     server.wait_for_log("No evaluation day starts", 1);
     assert!(health_problem(&server).contains("newest change"));
-    // A job that was queued in the future.
+    // The validation run was queued at a time that is now in the future. It runs nevertheless.
     let resume = server.post("/api/v1/queue/resume", &server.admin_token, &json!({}));
     assert_eq!(resume.status(), 204);
     assert_eq!(team.verdict(&server, &id)["state"], "valid");
@@ -104,12 +107,12 @@ fn server_starts_with_a_clock_before_the_newest_change() {
     let preview = accept(&[]);
     assert!(!preview.status.success());
     let preview = String::from_utf8_lossy(&preview.stderr).into_owned();
-    let size = preview
+    let step = preview
         .rsplit('"')
         .nth(1)
         .expect("it names the confirmation");
-    assert!(size.ends_with(" s behind"), "{preview}");
-    let accepted = accept(&["--confirm", size]);
+    assert!(step.ends_with(" s behind"), "{preview}");
+    let accepted = accept(&["--confirm", step]);
     assert!(accepted.status.success(), "{accepted:?}");
     assert_healthy(&server);
 }

@@ -224,6 +224,7 @@ fn submitted_folder_is_evaluated_and_dataset_downloaded() {
         output.contains("withdrawn") && output.contains(&second),
         "{output}"
     );
+    // The two ids begin with the time of the upload, so their common beginning is a part of both.
     let equal_chars = first
         .chars()
         .zip(second.chars())
@@ -292,7 +293,7 @@ fn submitted_folder_is_evaluated_and_dataset_downloaded() {
     );
     assert!(ada(&["board"]).expect_success().contains("Alpha"));
 
-    // Other names than the id.
+    // The evaluation is found by `latest`, by the end of its id, and by team and date.
     let date = evaluated["day"].as_str().expect("a day has a date");
     let end = &evaluation[28..];
     let quoted = format!("alpha {date}");
@@ -306,7 +307,7 @@ fn submitted_folder_is_evaluated_and_dataset_downloaded() {
     ada(&["evaluation", "Alpha", "2001-01-01"])
         .expect_refusal(FAILED, &["no results of 2001-01-01 are public"]);
     ada(&["evaluation", "soon"]).expect_refusal(FAILED, &["`latest`, or a team and a day"]);
-    // A visitor finds it on the board, and sees it when it is published.
+    // A visitor finds the evaluation on the board, but may see it only after its publication.
     let visitor = scratch.path().join("visitor");
     let by_day = ["evaluation", "Alpha", date, "--server", &server.url];
     faceoff_with_home(&visitor, &by_day, "")

@@ -2,7 +2,7 @@
 
 use crate::{
     Team,
-    axe::{axe_script, faults},
+    axe::{axe_script, page_defects},
     evaluation_path,
     replay::PREFERS_REDUCED_MOTION,
     shared_folder::start_prepared,
@@ -79,7 +79,7 @@ pub fn show_both_at(page: &Page, sample: usize) {
 pub const ONE_TABLE_BOX: &str = "[...document.querySelectorAll('.shared-controls label')]
     .find(label => label.textContent.includes('one table')).querySelector('input')";
 
-/// Number of the first replay's pixels with a colour of the style sheet in the flat view.
+/// Number of the first replay's pixels in the flat view that have this colour, which is the name of a variable of the style sheet.
 fn pixels_of(page: &Page, colour: &str) -> u64 {
     let count = page.evaluate(&format!(
         "(() => {{
@@ -127,10 +127,10 @@ fn compared_replays_show_same_sample() {
     page.set_view(View::DESKTOP);
     // axe-core finds violations of accessibility rules.
     let axe = axe_script();
-    let mut found = faults(&page, &axe, "an episode twice");
+    let mut found = page_defects(&page, &axe, "an episode twice");
     page.set_view(View::DESKTOP);
     page.go_to(&format!("{}{comparison}", server.url));
-    found.extend(faults(&page, &axe, "a comparison"));
+    found.extend(page_defects(&page, &axe, "a comparison"));
     assert!(found.is_empty(), "{}", found.join("\n"));
 }
 
@@ -182,7 +182,7 @@ fn two_episodes_are_drawn_on_one_table() {
         })()",
     );
     assert_eq!(link, format!("{url}#t=13&flat=1&ghost=1&paths=none"));
-    // Off again, each has its own table.
+    // Switched off again: each episode has its own table.
     let _ = page.evaluate(&format!("{ONE_TABLE_BOX}.click()"));
     show_both_at(&page, 12);
     assert_eq!(pixels_of(&page, "rp-ghost"), 0);
@@ -195,7 +195,7 @@ fn two_episodes_are_drawn_on_one_table() {
     assert_eq!(stills, 2);
 }
 
-/// The second replay is loaded at its second attempt only.
+/// The link's `ghost=1` asks for both episodes on one table. The second replay is loaded at its second attempt only.
 fn link_to_one_table_waits_for_a_late_replay(browser: &Browser, server: &Server, url: &str) {
     let page = browser.open_in(View::DESKTOP, &format!("{}/", server.url));
     page.before_scripts(FAIL_SECOND_REPLAY_ONCE);
@@ -233,6 +233,6 @@ fn link_shows_one_table(browser: &Browser, server: &Server, url: &str) {
     );
     let expected = json!({ "inView": true, "width": true, "playing": "Play" });
     assert_eq!(found, expected);
-    let found = faults(&page, &axe_script(), "two episodes on one table");
+    let found = page_defects(&page, &axe_script(), "two episodes on one table");
     assert!(found.is_empty(), "{}", found.join("\n"));
 }

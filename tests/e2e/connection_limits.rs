@@ -38,7 +38,7 @@ enum Behaviour {
     ReadsNothing,
 }
 
-/// A client that keeps its connection open without using it as it should.
+/// A client that keeps its connection open by its [`Behaviour`], and never sends or reads anything useful.
 struct IdleClient {
     stream: TcpStream,
     behaviour: Behaviour,

@@ -92,6 +92,7 @@ fn variants_after_release_get_no_evaluation_of_the_day() {
     let server = Server::start(&scratch.path().join("data"), CONFIG);
     let (greedy, stopped) = (
         Team::create(&server, "Greedy"),
+        // Its evaluation is cancelled.
         Team::create(&server, "Stopped"),
     );
     let first = greedy.submit(&server, &holding_agent(scratch.path(), "first"));
@@ -137,6 +138,7 @@ fn variants_after_release_get_no_evaluation_of_the_day() {
     // A rerun by the organiser uses the submission of the cutoff and the day's seed.
     let better = stopped.submit(&server, &holding_agent(scratch.path(), "better"));
     assert_eq!(better["active"], true, "{better:#}");
+    // The submission in the body has no effect.
     let with_newer = json!({ "submission": better["id"] });
     let rerun = server.post(
         &format!("{cancelled}/rerun"),
@@ -234,8 +236,11 @@ fn pending_rerun_delays_release_and_locks_out_no_team() {
     assert!(done["result"]["score"].is_number(), "{done:#}");
     let state = leaking.wait_until_finished(&server, &failed);
     assert_eq!(state["state"], "agent_failed", "{state:#}");
-    let first_try = broken.wait_until_finished(&server, &lost_bundle);
-    assert_eq!(first_try["state"], "platform_failed", "{first_try:#}");
+    let first_attempt = broken.wait_until_finished(&server, &lost_bundle);
+    assert_eq!(
+        first_attempt["state"], "platform_failed",
+        "{first_attempt:#}"
+    );
 
     // Log and faults of the failed agent are hidden on every page.
     let admin = &server.admin_token;

@@ -84,6 +84,7 @@ fn drop_file(page: &Page, name: &str, bytes: &[u8]) {
 fn dashboards_suffice_to_join_upload_and_start_a_day() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
+    // The team has no members yet.
     let _alpha = Team::create(&server, "Alpha");
     let teams: Value = server
         .get("/api/v1/teams", Some(&server.admin_token))
@@ -216,7 +217,7 @@ fn scripts_of_other_sites_read_what_visitors_may() {
     let text = |path: &str, options: Value| fetch(path, options).to_string();
     assert!(text("/api/v1/season", json!({})).contains("commitment"));
     assert!(text("/api/v1/no-such-resource", json!({})).contains("problems#"));
-    // No token, no cookie, no change, and no pages.
+    // The API refuses such a script's requests with a token or cookie and its changes; pages cannot be read at all.
     let token = json!({ "headers": { "Authorization": format!("Bearer {}", server.admin_token) } });
     let cookie = json!({ "credentials": "include" });
     let change = json!({ "method": "POST", "body": "{}", "headers": { "Content-Type": "application/json" } });

@@ -66,7 +66,7 @@ fn demo_evaluates_a_day_and_serves_its_board() {
         assert_eq!(results["tasks"][task]["episodes"], 3, "{task}");
     }
 
-    // A server on the demo's data folder shows the same board, in a browser and as plain HTML.
+    // A server on the demo's data folder shows the same board as the demo has printed, in a browser and as plain HTML.
     let server = Server::start(&data_dir, "");
     let board: Value = server
         .get("/api/v1/board", None)

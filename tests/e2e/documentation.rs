@@ -8,7 +8,8 @@ use faceoff_tests::{
 
 /// Widths of windows in CSS pixels, from a small phone to a desktop.
 const WIDTHS: [u32; 5] = [320, 390, 768, 1024, 1440];
-/// JavaScript: keeps what pages copy, with the browser's interface for that or, where it has none, with a selection.
+/// JavaScript: stores the text that a page copies in `window.copied`. Pages copy by the browser's clipboard interface or, where it has
+/// none, by a selection.
 const KEEP_COPIES: &str = "
     if (navigator.clipboard) navigator.clipboard.writeText = async text => { window.copied = text; };
     document.execCommand = command => { window.copied = document.activeElement.value; return command === 'copy'; };";
@@ -42,7 +43,7 @@ fn listings_are_copied_without_prompts() {
         let page = browser.open(&format!("{url}/docs"));
         page.before_scripts(KEEP_COPIES);
         page.go_to(&format!("{url}/docs/start"));
-        // Of a session the commands are copied, of another listing everything.
+        // Of a terminal session only the commands are copied, without prompts and output; of another listing everything is.
         let commands = copy(&page, "faceoff new my-agent");
         assert!(commands.contains("faceoff new my-agent\n"), "{commands}");
         assert!(!commands.contains("an agent for the task"), "{commands}");

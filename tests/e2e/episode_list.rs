@@ -9,12 +9,13 @@ fn list_of_episodes_shows_stills_and_marks_open_replays() {
     let (server, evaluation) = released_evaluation(scratch.path());
     let browser = Browser::start(scratch.path());
     let page = browser.open(&format!("{}{evaluation}/episodes", server.url));
-    let is_drawn = "[...document.querySelectorAll('.episodes tbody img')].filter(image => image.complete && image.naturalWidth > 0).length";
-    page.wait_until(&format!("{is_drawn} > 0"));
+    // JavaScript: the number of still pictures that are loaded.
+    let loaded_pictures = "[...document.querySelectorAll('.episodes tbody img')].filter(image => image.complete && image.naturalWidth > 0).length";
+    page.wait_until(&format!("{loaded_pictures} > 0"));
     // Pictures far below the window are loaded on the way there.
     let _ = page.evaluate("scrollTo(0, document.body.scrollHeight)");
     page.wait_until(&format!(
-        "{is_drawn} == document.querySelectorAll('.episodes tbody tr').length"
+        "{loaded_pictures} == document.querySelectorAll('.episodes tbody tr').length"
     ));
     page.set_view(View::PHONE);
     assert_eq!(page.overflow(), 0);

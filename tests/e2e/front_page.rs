@@ -17,7 +17,7 @@ fn evaluated_striker(scratch: &Path) -> (Server, String) {
     })
 }
 
-/// JavaScript: does the drawing move?
+/// JavaScript: does the drawing of an episode on the front page move?
 const IS_MOVING: &str = "!document.querySelector('[data-highlight] svg').animationsPaused()";
 
 fn click(page: &Page, selector: &str) {

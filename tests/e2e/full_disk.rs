@@ -456,7 +456,8 @@ fn dataset_is_joined_once_space_is_free() {
     assert_undisturbed(disk, team, &evaluation, &setup.agent, scratch.path());
 }
 
-/// Makes the database unwritable for longer than a lease, the time for which a job is assigned to a worker.
+/// Makes the database unwritable for longer than a lease, the time for which a job is assigned to a worker. The evaluation continues
+/// once there is space. With `min_free_bytes` of 0 the server does not pause the queue before the disk is full.
 fn block_database_writes(log: LogTarget, min_free_bytes: u64) {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let config = config(min_free_bytes, &scratch_on_other_disk(scratch.path()));
@@ -503,7 +504,7 @@ fn block_database_writes(log: LogTarget, min_free_bytes: u64) {
         let last_line = log.lines().last().unwrap_or_default();
         assert!(
             log.contains("serving"),
-            "it logged before and after: {last_line}"
+            "the log of the server's start is lost; the last line is {last_line}"
         );
     }
 }
@@ -514,7 +515,7 @@ fn unwritable_database_recovers_after_full_disk() {
 }
 
 #[test]
-fn unwritable_database_recovers_without_reserved_space() {
+fn unwritable_database_recovers_without_min_free_bytes() {
     block_database_writes(LogTarget::Test, 0);
 }
 

@@ -31,6 +31,7 @@ fn link_on_a_games_page_plays_from_two_seconds_before() {
     let events = summary["events"].as_array().expect("a list");
     let foul = events.iter().find(|event| event["event"] == "foul");
     let foul_step = foul.expect("there is a foul")["game_step"].as_u64();
+    // 100 control steps are 2 s.
     let first_step = foul_step.expect("a number") - 100;
 
     let browser = Browser::start(scratch.path());

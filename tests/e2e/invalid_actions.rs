@@ -145,7 +145,7 @@ fn prepare_only() -> String {
 }
 
 /// Extreme valid actions: name, interpolation, and the action (Python) from the second episode of `prepare` on. The largest
-/// valid number is 1e4; `s` is 1e4 and -1e4 alternately, `held` the first measured position.
+/// valid number is 1e4; `s` is 1e4 and -1e4 alternately, `held` the first measured position. `obs[13:20]` are the joint velocities.
 const EXTREME_ACTIONS: [(&str, &str, &str); 7] = [
     (
         "along-its-velocity",

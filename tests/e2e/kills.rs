@@ -77,7 +77,7 @@ impl KillMoment {
         }
     }
 
-    /// Must be called for each entry of the log, in order.
+    /// Whether this entry of the log is the moment. Must be called for each entry, in order, because it counts them.
     fn is_reached(&mut self, event: &Event) -> bool {
         *self = match (*self, event) {
             (Self::AfterEntries(0), _) | (Self::DuringShard, Event::Started(_)) => return true,

@@ -81,7 +81,7 @@ fn largest_bundle_needs_small_part_of_its_size_in_memory() {
     assert_eq!(answer.status(), 201);
     let submission: Value = answer.json().expect("the API speaks JSON");
     let id = submission["id"].as_str().expect("a submission has an id");
-    // The validation run reads the bundle, too, and rejects it, since it is no archive.
+    // The validation run reads the bundle, too, and rejects it: after the header of an archive it is only noise.
     let verdict = team.verdict(&server, id);
     assert_eq!(verdict["state"], "invalid", "{verdict:#}");
     let after = peak_bytes(&server);

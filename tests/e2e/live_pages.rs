@@ -15,6 +15,7 @@ use std::{
 const MAX_STREAMS: usize = 384;
 
 /// A script that records each event stream that a page opens, and how many milliseconds it waits before it opens the next.
+/// `followStream` is the function of the page's script that opens one.
 const RECORD_STREAMS: &str = "
     window.streams = [];
     window.waits = [];

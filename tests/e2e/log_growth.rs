@@ -44,7 +44,7 @@ fn publish_terms(server: &Server, version: u32) {
     }
 }
 
-/// Stops the readers, even if the test fails.
+/// Tells the reading threads to stop, even if the test fails.
 struct StopGuard<'a>(&'a AtomicBool);
 
 impl Drop for StopGuard<'_> {

@@ -37,6 +37,7 @@ fn no_log_answer_or_output_shows_a_secret() {
     .map(|(name, value)| (name, value.to_owned()));
     let server = Server::start_with_environment(&data_dir, CONFIG, &variables);
     server.wait_for_log("NATS cannot be reached", 1);
+    // Each text that a user can see, with the place where it is shown.
     let mut shown = Vec::new();
     for path in [
         "/api/v1/health",

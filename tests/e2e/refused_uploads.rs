@@ -106,7 +106,7 @@ fn output_of(mut command: Command) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
-/// A large file without a format that the server knows.
+/// A large file of zeros, which is no archive.
 pub fn large_file(folder: &Path) -> PathBuf {
     let path = folder.join("agent.tar.gz");
     let file = fs::File::create(&path).expect("a scratch file can be made");

@@ -105,7 +105,9 @@ struct ReferenceRun {
     /// The API path of the evaluation.
     evaluation: String,
     team: Team,
+    /// Result and dataset from the local slot.
     expected: (Value, Archive),
+    /// Number of episodes of all tasks.
     episodes: usize,
 }
 
@@ -123,6 +125,7 @@ impl ReferenceRun {
     }
 
     fn prepare_with(scratch: &Path, config: &str, episodes: usize) -> Self {
+        // All tests of a run share the evaluation and its local result; each gets a copy of the data folder.
         let shared = shared_folder(&format!("reference-run-of-{episodes}"), |folder| {
             let [data_dir, local_data_dir] = ["data", "local"].map(|name| folder.join(name));
             let (evaluation, team) = queue_evaluation(&data_dir, folder, config);

@@ -58,7 +58,7 @@ pub const PREFERS_REDUCED_MOTION: &str = "
         : original.call(window, query);
 ";
 
-/// The pixels with the puck's colour in the flat view: x and y of their centre, and their number.
+/// The pixels with the puck's colour in the flat view: x and y of their centre (pixels), and their number.
 fn puck_pixels(page: &Page) -> [f64; 3] {
     let found = page.evaluate(
         "(() => {

@@ -37,6 +37,8 @@ fn space_and_clicks_play_and_drags_do_not() {
                 at('pointerup', 300 + moved); area.click(); };
         })()",
     );
+    // Space and clicks on the picture start and stop the replay. A click after a move of 60 pixels is the end of a drag, which turns the
+    // camera and changes nothing. Links and fields keep the key for themselves.
     assert!(plays_after(&page, "space(document.body)"));
     assert!(!plays_after(&page, "space(document.querySelector('h1'))"));
     assert!(!plays_after(

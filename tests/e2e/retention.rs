@@ -50,6 +50,7 @@ fn expired_dataset_is_removed_and_result_stays() {
     let closed = server.poll(&stage_path, &team.token, |stage| stage["phase"] == "closed");
     assert_eq!(closed["retention"], json!({}));
     // The change removes files, so the server demands a confirmation.
+    // Files are kept until the stage closes, which is now.
     let mut body = json!({ "retention": { "until": closes_at } });
     let (status, refused) = change_stage(&server, &stage_path, &body);
     assert_eq!(status, 409, "{refused:#}");

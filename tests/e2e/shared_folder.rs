@@ -52,8 +52,8 @@ fn remove_old(runs: &Path) {
     }
 }
 
-/// Starts a server on a copy of a shared data folder. `prepare` gets a server with a new data folder and a scratch folder, and returns a path
-/// of that server, which all tests get.
+/// Starts a server on a copy of a shared data folder. For the first test, `prepare` gets a server with a new data folder, and a scratch
+/// folder. It creates what the tests need and returns a path on that server, which every test gets with its server.
 pub(crate) fn start_prepared(
     name: &str,
     scratch: &Path,

@@ -123,13 +123,14 @@ fn assert_fair_shares(
         ),
         (&is_second_kind, &is_first_kind),
     ] {
-        let both: Vec<&LoggedJob> = jobs
+        let jobs_of_both: Vec<&LoggedJob> = jobs
             .iter()
             .filter(|job| is_first_kind(job) || is_second_kind(job))
             .collect();
         // Before the first and after the last job of the other kind, none of it is pending.
         let others = || {
-            both.iter()
+            jobs_of_both
+                .iter()
                 .enumerate()
                 .filter(|(_, job)| is_other_kind(job))
         };
@@ -141,7 +142,7 @@ fn assert_fair_shares(
         let longest_ms = others().map(|(_, job)| job.duration_ms()).max();
         // The time between a claim and its line in the log belongs to no job: at most 2 s.
         let longest_ms = longest_ms.unwrap_or_default() + 2000;
-        for in_a_row in both[first..last].chunk_by(|a, b| is_kind(a) == is_kind(b)) {
+        for in_a_row in jobs_of_both[first..last].chunk_by(|a, b| is_kind(a) == is_kind(b)) {
             if is_kind(in_a_row[0]) {
                 // When the last of these jobs started, this kind had not had more time than the other.
                 let before_last_ms: i64 = in_a_row[..in_a_row.len() - 1]

@@ -278,6 +278,7 @@ impl SoakState {
 struct Contestant {
     team: Team,
     submission: Value,
+    /// The same agent without sleeping, so that the local evaluation does not take as long.
     bundle_without_pauses: PathBuf,
 }
 
@@ -320,6 +321,7 @@ fn organiser_token(server: &Server) -> String {
 
 /// Asserts that a log shows no error beyond the disturbances.
 fn assert_no_unexpected_errors(log: &str) {
+    // `begin_with` is part of the error of the database library about a transaction inside another one, which is a bug.
     for word in ["panicked", "begin_with", "poisoned"] {
         assert!(!log.contains(word), "{word}: {log}");
     }

@@ -166,6 +166,7 @@ fn commands_run_a_tournament_from_opening_to_close() {
     for text in ["A wins", "ratings by results", "Bradley-Terry"] {
         assert!(ratings.contains(text), "{text:?} is not in {ratings}");
     }
+    // How often each team would be champion in replays of the schedule.
     let champion_shares = visitor_command(&server, &["certainty"]).expect_success();
     assert!(
         champion_shares.contains("has not been replayed"),

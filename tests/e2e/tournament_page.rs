@@ -2,7 +2,7 @@
 
 use crate::{
     CONFIG,
-    axe::{axe_script, faults},
+    axe::{axe_script, page_defects},
     commands::admin,
     dashboards::{InvitedUser, sign_in},
     tournament::{OPEN_CUP, create_teams_with_hold},
@@ -59,6 +59,7 @@ fn round_pages_update_live_and_can_hide_results() {
         .get(&format!("/api/v1{game}"), None)
         .json()
         .expect("the API speaks JSON");
+    // The text with the reason of the result is on every page that shows the result.
     let because = view["result"]["because"]
         .as_str()
         .expect("a finished game has a reason for its result");
@@ -100,7 +101,7 @@ fn round_pages_update_live_and_can_hide_results() {
         page.wait_until(
             "[...document.querySelectorAll('section.replay')].every(replay => replay.dataset.state == 'ready')",
         );
-        found.extend(faults(page, &axe, &path));
+        found.extend(page_defects(page, &axe, &path));
     }
     assert!(found.is_empty(), "{}", found.join("\n"));
 }

@@ -41,7 +41,7 @@ impl RecordedAnswers {
         self.0["tokens"][team].as_str().expect("a team has a token")
     }
 
-    /// The answer with this name, such as `day two Alpha`: the evaluation of the team Alpha on the second day.
+    /// The response with this name, such as `day two Alpha`: the evaluation of the team Alpha on the second day.
     fn answer(&self, name: &str) -> &Value {
         let answer = &self.0["answers"][name];
         assert!(answer.is_object(), "the fixture has no answer {name}");

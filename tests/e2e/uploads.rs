@@ -269,7 +269,8 @@ fn oversized_archive_structures_are_refused() {
     let honest = HonestTeam::create(&server);
     let team = Team::create(&server, "Endless");
     let evaluation = honest.start_evaluation(&server);
-    // Archives of 350 MiB, which compress to less than 2 MiB.
+    // Each archive compresses to less than 2 MiB. It has up to 350 MiB that belong to no file, such as headers, or a structure that is
+    // refused, such as thousands of folders.
     let repeated_entries = |kind, content: &[u8]| {
         let tar = (0..350).fold(Tar::new(), |tar, _| tar.entry(kind, "long", content));
         tar.compress()
@@ -461,7 +462,7 @@ fn upload_quota_is_per_team_and_reported_in_bytes() {
     }
 }
 
-/// The program, given the address of a relay in place of the server's.
+/// Runs `faceoff submit` through a relay, which breaks connections.
 fn submit_through(relay: &Relay, token: &str, bundle: &Path) -> commands::CommandOutput {
     let address = format!("http://{}", relay.address());
     let bundle = bundle.to_str().expect("a scratch path is text");

@@ -1,10 +1,10 @@
-//! Visibility of a team's data (dataset, submission), and the errors that other callers get.
+//! Visibility of a team's data (dataset, submission), and the errors of refused requests: of other callers, and for invalid uploads.
 
 use crate::{CONFIG, Team};
 use faceoff_tests::{repository, server::Server};
 use serde_json::Value;
 
-/// Asserts a problem+json error with this status whose detail says what to do.
+/// Asserts that the response is a problem document (RFC 9457) with this status and all fields that clients show.
 fn assert_problem(answer: reqwest::blocking::Response, status: u16) {
     assert_eq!(answer.status(), status);
     assert_eq!(

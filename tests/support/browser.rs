@@ -43,6 +43,7 @@ pub struct View {
     pub height: u32,
     /// The visitor prefers the dark colour scheme.
     pub dark: bool,
+    /// JavaScript is enabled.
     pub scripts: bool,
     /// The visitor's time zone.
     pub time_zone: &'static str,
@@ -299,7 +300,7 @@ impl Page<'_> {
         ));
     }
 
-    /// The value of an expression; a promise is awaited.
+    /// The value of a JavaScript expression; a promise is awaited.
     ///
     /// # Panics
     /// If it throws.

@@ -14,7 +14,7 @@ use std::{
 #[derive(Debug)]
 pub struct Bucket {
     _process: Process,
-    /// The server ends when its standard input is closed.
+    /// Kept open: the server ends when its standard input is closed.
     _input: ChildStdin,
     endpoint: String,
 }

@@ -19,7 +19,7 @@ pub fn library() -> PathBuf {
         .expect("libfaketime is installed; `make setup-test` installs it")
 }
 
-/// A system clock that a test sets while a program runs. Its monotonic clocks stay right.
+/// A system clock that a test sets while a program runs. The program's monotonic clocks stay right.
 #[derive(Debug)]
 pub struct SystemClock {
     file: PathBuf,

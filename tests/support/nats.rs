@@ -11,7 +11,7 @@ use std::{
 };
 
 const CONFIG: &str = "nats-server.conf";
-/// Setting that keeps results of tests from depending on the free disk space, by which NATS otherwise limits its streams.
+/// A setting for NATS: its streams may have 16 GB. By default the free disk space limits them, on which tests must not depend.
 pub const ENOUGH_SPACE: &str = "jetstream: {max_file_store: 16GB}\n";
 
 /// A NATS server on a free port. Dropping it kills it (SIGKILL).

@@ -45,7 +45,7 @@ pub struct Relay {
     link: Arc<Mutex<Link>>,
 }
 
-/// The state of a relay, which its threads share.
+/// The state of a relay, which its threads share: target, disturbances and open connections.
 #[derive(Debug, Default)]
 struct Link {
     /// `None`: connections are dropped.
@@ -53,9 +53,11 @@ struct Link {
     /// Delay of each forwarded chunk.
     delay: Duration,
     breaks: Option<ConnectionBreaks>,
+    /// Number of connections so far.
     connections: u64,
     /// Connections that broke by [`ConnectionBreaks`].
     broken: u64,
+    /// Both ends of the open connections, so that they can be cut.
     open: Vec<TcpStream>,
 }
 

@@ -20,7 +20,7 @@ use std::{
 /// How long a test waits for an expected event before it fails: long enough for slow machines, and short enough that it fails, with
 /// the logs, before nextest ends it.
 pub const TIMEOUT: Duration = Duration::from_secs(1200);
-/// Size of the smallest pipe on Linux.
+/// Size of the smallest pipe on Linux: one page.
 const PAGE_BYTES: usize = 4096;
 
 /// A builder for HTTP clients. They use no TLS, so the machine's certificate authorities are not read.
@@ -206,7 +206,7 @@ impl Server {
         self.process.kill();
     }
 
-    /// Starts the server, and kills it `delay` after `is_moment` has returned true for an entry of its log. The log has each
+    /// Starts the server, and kills it `delay` after `is_moment` has returned true for an entry of its log. This log has each
     /// statement of the database and goes through a pipe of one page. So the server is at most one page of log ahead of
     /// the entry that `is_moment` has seen.
     ///
@@ -241,7 +241,7 @@ impl Server {
             }
         }
         thread::sleep(delay);
-        // The log's pipe is still full, so the server cannot run ahead.
+        // The log was not read during the delay. So its pipe is full, and the server has waited to log its next entry.
         drop(process);
     }
 
@@ -293,7 +293,7 @@ impl Server {
             .expect("the server answers")
     }
 
-    /// Repeats `GET path` until `is_done` returns true; returns the last response.
+    /// Repeats `GET path` until `is_done` returns true; returns the last response. With `|_| true` it is a single request.
     ///
     /// # Panics
     /// After [`TIMEOUT`], with the last answer.

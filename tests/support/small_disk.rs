@@ -26,10 +26,10 @@ const PAGE_BYTES: usize = 4096;
 /// The file that fills the disk.
 const FILLER: &str = "filler";
 
-/// Mounts a disk of size `$0` at `$1`, prints `mounted`, and holds it until its input ends.
+/// A shell script: mounts a disk of size `$0` at `$1`, prints `mounted`, and holds it until its input ends.
 const MOUNT_AND_HOLD: &str =
     r#"mount -t tmpfs -o "size=$0,mode=0700" faceoff "$1" && echo mounted && exec cat"#;
-/// Runs the arguments, with standard error appended to the file `$0` unless that is empty.
+/// A shell script: runs its arguments as a command. Standard error is appended to the file `$0`, unless that is empty.
 const LOG_AND_RUN: &str = r#"if [ -n "$0" ]; then exec "$@" 2>>"$0"; else exec "$@"; fi"#;
 
 /// The destination of the server's log.

@@ -136,7 +136,7 @@ impl Worker {
         assert!(status.success(), "{status}");
     }
 
-    /// Has the process ended? It is not reaped.
+    /// Has the process ended? The check does not reap it.
     ///
     /// # Panics
     /// If it was reaped.

@@ -17,7 +17,7 @@ pub fn competition() -> &'static Arc<Competition> {
     SIMULATOR.competition()
 }
 
-/// Its simulator.
+/// The simulator of [`competition`].
 pub fn simulator() -> Arc<dyn Simulator> {
     SIMULATOR.clone()
 }

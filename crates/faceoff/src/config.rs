@@ -131,18 +131,18 @@ pub struct EvaluationConfig {
     pub days_off: Vec<Date>,
     /// Time zone of `at` and `cron`, and of the dates of evaluation days.
     pub zone: IanaTimeZone,
-    /// Deadline of evaluation days.
+    /// When the evaluations of a day end, finished or not.
     pub day_deadline: DayDeadline,
     /// Allowed agent faults; with more, an evaluation ends without a score.
     pub max_faults: u32,
-    /// Episodes per task and profile of the ablation that the schedule starts for each submission;
-    /// 0: none.
+    /// Episodes per task and profile of the *ablation* that the schedule starts for each submission; 0: none. An ablation
+    /// evaluates the agent under each perturbation alone.
     pub ablation_episodes: u32,
     /// Weights of the tasks' success rates in the score.
     pub weights: TaskWeights,
     /// Most penalty points per episode of the tiers (classes of agents) deployable and improvable.
     pub tier_bounds: Option<TierBounds>,
-    /// Magnitudes of the perturbations that the profile enables; left out, those of the ruleset.
+    /// Magnitudes of the perturbations that the profile (a set of perturbations) enables; left out, those of the ruleset.
     #[serde(skip_serializing_if = "Magnitudes::is_empty")]
     pub perturbations: Magnitudes,
     /// When the datasets of released days are published.
@@ -189,7 +189,7 @@ pub struct WorkersConfig {
     /// Episodes of each shard of a remote worker that are simulated again before the result is accepted; 0: none, and
     /// no games.
     pub checked_episodes: u32,
-    /// CPUs of all agents; empty: each slot has its own, if there are two per slot.
+    /// CPUs that all agents share; empty: each slot has separate ones, if the host has two per slot.
     pub agent_cpus: Vec<usize>,
     /// Folder for unpacked bundles and unfinished recordings; left out, `scratch` in the data folder.
     pub scratch_dir: Option<PathBuf>,
@@ -327,7 +327,7 @@ impl ConnectionsConfig {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SandboxConfig {
-    /// Layers (single protections) of the sandbox that are not used.
+    /// Layers (single protections) of the sandbox that are not used, for hosts that lack them.
     pub given_up: Vec<Layer>,
     /// The runtimes' files are copied into memory if they are at most this large; 0: never.
     pub resident_bytes: u64,

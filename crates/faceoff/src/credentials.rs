@@ -26,7 +26,7 @@ pub struct Credentials {
 #[serde(deny_unknown_fields)]
 pub struct Login {
     pub token: String,
-    /// The token was created by signing in, so signing out revokes it.
+    /// The token was created by signing in, so signing out revokes it. A token that the user supplied stays valid.
     #[serde(
         default,
         rename = "made_here",

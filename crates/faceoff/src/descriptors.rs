@@ -8,10 +8,11 @@ use serde::Serialize;
 /// Largest limit to request: enough for all connections of a server. Some hosts allow millions, and programs that
 /// iterate over all descriptors would become slow.
 const MAX_LIMIT: u64 = 1 << 16;
-/// Descriptors of the service itself: database, log, runtime, listener.
-const SERVICE_DESCRIPTORS: u64 = 64;
+/// Descriptors of the server itself: database, log, async runtime, listener.
+const SERVER_DESCRIPTORS: u64 = 64;
 /// Most descriptors of a slot. Each of its two agents has sockets, kernel counters (two files for each of its first 16
-/// threads), files for its termination and up to 32 files for whose locks it waits; the slot has an unpacked bundle, recordings and datasets.
+/// threads), files for its termination and up to 32 files for whose locks it waits. The slot has an unpacked bundle, recordings
+/// and datasets.
 const DESCRIPTORS_PER_SLOT: u64 = 230;
 /// Descriptors per connection: the socket, and a file that is sent, or two handles of a file that is received.
 const DESCRIPTORS_PER_CONNECTION: u64 = 3;
@@ -25,10 +26,11 @@ const ADDRESS_DIVISOR: usize = 4;
 pub struct Descriptors {
     /// Limit of open descriptors.
     pub limit: u64,
-    /// Reserved for evaluations and the service itself.
+    /// Reserved for slots and the server itself.
     pub reserved: u64,
     /// Most open connections.
     pub connections: usize,
+    /// Most open connections of one address.
     pub per_address: usize,
 }
 
@@ -64,7 +66,7 @@ impl Descriptors {
     /// # Errors
     /// If too few are left for connections.
     pub fn divide(limit: u64, slots: usize, requested: &ConnectionLimits) -> anyhow::Result<Self> {
-        let reserved = SERVICE_DESCRIPTORS + DESCRIPTORS_PER_SLOT * slots as u64;
+        let reserved = SERVER_DESCRIPTORS + DESCRIPTORS_PER_SLOT * slots as u64;
         let possible = limit.saturating_sub(reserved) / DESCRIPTORS_PER_CONNECTION;
         let connections = usize::try_from(possible)
             .unwrap_or(usize::MAX)

@@ -12,7 +12,7 @@ pub enum Exit {
     Done = 0,
     /// The command failed or found a problem: an invalid agent, faults, a difference, a host with missing features.
     Failed = 1,
-    /// The command line is invalid, or there is nothing to verify.
+    /// The command line is invalid, or `faceoff verify` cannot read or simulate the recording.
     Misused = 2,
     /// The server refused the request, with a reason.
     Refused = 3,
@@ -33,7 +33,7 @@ impl Exit {
         if error.downcast_ref::<NotSignedIn>().is_some() {
             return Self::NotAllowed;
         }
-        // A `reqwest::Error` is an interrupted response.
+        // A `reqwest::Error` means that the response was interrupted.
         if error.downcast_ref::<Unreachable>().is_some()
             || error.chain().any(|cause| cause.is::<reqwest::Error>())
         {

@@ -58,13 +58,13 @@ fn parse_filter(list: &str) -> anyhow::Result<Targets> {
     let filter: Targets = list
         .parse()
         .with_context(|| format!("RUST_LOG={list:?}: expected e.g. info,sqlx::query=debug"))?;
-    let is_named = filter
+    let names_nats_client = filter
         .iter()
         .any(|(target, _)| target.starts_with(NATS_CLIENT));
     let is_verbose = filter
         .default_level()
         .is_some_and(|level| level > LevelFilter::INFO);
-    Ok(if is_named || is_verbose {
+    Ok(if names_nats_client || is_verbose {
         filter
     } else {
         filter.with_target(NATS_CLIENT, LevelFilter::OFF)

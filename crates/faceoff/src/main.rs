@@ -1,4 +1,8 @@
-//! The `faceoff` binary: parses the command line and runs a subcommand, each of which has its own file.
+//! The `faceoff` binary: parses the command line and runs a subcommand, each of which has its own file in `commands`.
+//!
+//! `client` calls a server's API, `credentials` stores logins. `competition` is air hockey, the only competition compiled in.
+//! `descriptors` divides the file descriptors of a server, `machine` describes this host, `packing` packs agents, and `user_scope` gets
+//! control groups for a user without privileges.
 
 #[macro_use]
 mod terminal;
@@ -44,7 +48,7 @@ enum Command {
     Play(commands::play::PlayCommand),
     /// Compare two evaluations on the same episodes.
     Compare(commands::compare::CompareCommand),
-    /// Draw an episode of a dataset as a page or picture.
+    /// Draw a recorded game, or an episode of a dataset, as a page, picture or video.
     Replay(commands::replay::ReplayCommand),
     /// Simulate a dataset or a game again and compare every state and score.
     Verify(commands::verify::VerifyCommand),
@@ -92,7 +96,8 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    // Before threads open files. If it fails, the start of an agent that needs it says so.
+    // Keeps file descriptors 3 and 4 free for agents that answer on them, before threads open files. A failure is reported when such
+    // an agent starts.
     let _ = faceoff_sandbox::reserve_protocol_descriptors();
     let outcome = match Cli::parse().command {
         Command::Serve(command) => command.run(),

@@ -18,7 +18,7 @@ use std::{
     path::Path,
 };
 
-/// From this size on, a file is mentioned: it may be a model, but also a recording or core dump by mistake.
+/// Packed files of at least this size are listed for the user. One may be a model, but also a recording or core dump by mistake.
 pub const LARGE_BYTES: u64 = 20_000_000;
 
 impl Selection {

@@ -66,7 +66,7 @@ pub fn stderr() -> Lines<Stderr> {
     Lines::new(io::stderr())
 }
 
-/// Writes whole lines, with unprintable characters escaped.
+/// Buffers what is written, and passes on whole lines with unprintable characters escaped.
 #[derive(Debug)]
 pub struct Lines<W> {
     out: W,

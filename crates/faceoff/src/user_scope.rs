@@ -30,7 +30,7 @@ pub fn enter() {
     if is_offered(cgroups, Path::new(&runtime_folder), "systemd-run") {
         let mut command = scope("systemd-run");
         let command = command.arg(program).args(env::args_os().skip(1));
-        // Returns only if the command cannot be started.
+        // `exec` replaces this process, so it returns only if the command cannot be started.
         let error = command.env(IN_SCOPE_VARIABLE, "1").exec();
         tracing::debug!(%error, "the command runs without a scope");
     }
@@ -59,7 +59,7 @@ fn succeeds(probe: &mut Child) -> bool {
             Err(_) => return false,
         }
     }
-    // It may have ended meanwhile.
+    // The probe may have ended meanwhile.
     let _ = probe.kill();
     let _ = probe.wait();
     false
@@ -94,6 +94,7 @@ mod tests {
             fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
             path.to_str().unwrap().to_owned()
         };
+        // Drops the options that `scope` passes to systemd-run, and runs the rest.
         let works = program("works", "shift 4; [ \"$1\" = -- ] && shift; exec \"$@\"");
         let fails = program("fails", "echo Failed to connect to bus >&2; exit 1");
         assert!(!is_offered(&cgroups, &runtime, &works), "version 1");

@@ -16,6 +16,7 @@ pub fn find_cycles(folder: &Path) -> Vec<String> {
         .keys()
         .map(|file| (file, reachable(&imports, file)))
         .collect();
+    // Files of cycles that have a description already.
     let mut described = BTreeSet::new();
     let mut descriptions = Vec::new();
     for file in imports.keys() {

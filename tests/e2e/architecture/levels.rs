@@ -66,6 +66,7 @@ pub fn violations(folder: &Path, levels: &Levels) -> Vec<String> {
         .collect();
     for (file, targets) in &imports {
         for (target, name) in targets {
+            // The root of the crate (`lib.rs`, `main.rs`) has no level.
             let (Some(from), Some(to)) = (module_of(file), module_of(target)) else {
                 continue;
             };

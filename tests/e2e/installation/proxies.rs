@@ -411,7 +411,7 @@ fn wait_until_closed(mut connections: Vec<TcpStream>, expected: usize) {
     assert_eq!(connections.len(), expected);
 }
 
-/// Checks a proxy with its own time limits.
+/// Checks that a proxy closes half requests after its own time limits.
 fn check_half_requests_end(start_proxy: impl Fn(&Server, &Path) -> Proxy) {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
@@ -434,7 +434,7 @@ fn half_requests_to_caddy_end_in_time() {
 fn nginx_limits_half_requests_of_an_address() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
-    // Only the number is limited.
+    // Without timeouts, only the number of an address's connections is limited.
     let no_timeout = [(
         "client_header_timeout 10s",
         "client_header_timeout 1d".to_owned(),

@@ -28,7 +28,8 @@ fn wait_for_result(
     let tasks = view["tasks"].as_object_mut().expect("it has tasks");
     for (task, profiles) in tasks {
         for effect in profiles.as_array_mut().expect("a list of profiles") {
-            // Penalty points depend on computation times.
+            // Penalty points depend on computation times. `lost` and `gained` count the episodes that fail or succeed other than in the
+            // ideal simulator.
             let _ = effect["penalty_points"].take();
             different_outcomes += effect["lost"]
                 .as_u64()

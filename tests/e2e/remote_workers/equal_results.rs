@@ -96,7 +96,7 @@ fn remote_results_equal_local_results() {
     }
 }
 
-/// The subject of a message that the test sends to itself after all others.
+/// The subject of a message that the test sends to itself after all others, so that it knows their end.
 const END_SUBJECT: &str = "faceoff.over";
 
 #[test]

@@ -65,7 +65,7 @@ impl FakeWorker {
         }
     }
 
-    /// Reports a successful episode that was never run.
+    /// Reports a job's first episode as successful, although it was never run.
     pub(crate) async fn report_shard(&self, job: &Value) {
         let assignment = &job["order"]["assignment"];
         let spec = &assignment["spec"];

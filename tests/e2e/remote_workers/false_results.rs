@@ -382,6 +382,7 @@ impl Drop for WriteLock {
     }
 }
 
+/// Before each check of a result the server counts it in a file, so that a result whose checks always end the server is noticed.
 #[test]
 fn result_whose_checks_never_end_bans_its_worker() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
@@ -400,22 +401,22 @@ fn result_whose_checks_never_end_bans_its_worker() {
     let fake = runtime.block_on(FakeWorker::connect(&nats));
     let job = runtime.block_on(fake.take_job());
     let nonce = job["order"]["lease"]["nonce"].as_str();
-    let check = reference_run
+    let check_count_file = reference_run
         .data_dir
         .join("result-checks")
         .join(nonce.expect("a lease has a nonce"));
     // The check cannot store the result while the database is locked, and is interrupted by the end of the server.
     let lock = WriteLock::take(&reference_run.data_dir.join("faceoff.sqlite3"));
     runtime.block_on(fake.report_failure(&job, "first"));
-    while !check.exists() {
+    while !check_count_file.exists() {
         std::thread::sleep(Duration::from_millis(1));
     }
     server.kill();
     drop(lock);
-    let unfinished = fs::read_to_string(&check).expect("the check has not ended");
-    assert_eq!(unfinished, "1");
-    // As after two more checks.
-    fs::write(&check, "3").expect("a scratch file can be written");
+    let started_checks = fs::read_to_string(&check_count_file).expect("the check has not ended");
+    assert_eq!(started_checks, "1");
+    // As after two more checks that did not end.
+    fs::write(&check_count_file, "3").expect("a scratch file can be written");
     let server = start();
     runtime.block_on(fake.report_failure(&job, "second"));
     server.wait_for_log("a worker is banned", 1);
@@ -429,7 +430,10 @@ fn result_whose_checks_never_end_bans_its_worker() {
     let honest = Worker::start(scratch.path(), "honest", &worker_config(nats.address(), 1));
     reference_run.assert_equal_result(&server);
     honest.stop();
-    assert!(!check.exists(), "the number of checks is forgotten");
+    assert!(
+        !check_count_file.exists(),
+        "the number of checks is forgotten"
+    );
 }
 
 #[test]

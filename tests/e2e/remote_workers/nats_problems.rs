@@ -105,7 +105,7 @@ fn result_waits_while_stream_is_full() {
     let message = "the result is not stored by NATS yet; trying again";
     worker.wait_for_log(message, 1);
     assert!(worker.log().contains("maximum bytes"), "{}", worker.log());
-    // The page of workers reports the problem, too, and the health endpoints that there is one.
+    // The page of workers describes the problem, too. The health endpoints only say that there is one.
     wait_for_problem(&setup.server, "maximum bytes");
     for path in ["/api/v1/health", "/readyz"] {
         let _ = setup.server.poll(path, &setup.server.admin_token, |view| {

@@ -19,7 +19,7 @@ pub(crate) struct Evaluations {
 
 #[derive(Debug, Default)]
 struct Progress {
-    /// Shards that workers have run.
+    /// Shards that workers have finished, for which simulated workers sleep.
     played: u32,
     /// Results that NATS has stored.
     results: u32,
@@ -34,7 +34,7 @@ impl Evaluations {
         }
     }
 
-    /// Counts a shard as played. Is it the evaluation's last one?
+    /// Counts a shard as finished by its worker. Is it the evaluation's last one?
     pub(crate) fn record_played(&self, id: Uuid) -> bool {
         let mut progress = self.progress();
         let evaluation = progress.entry(id).or_default();

@@ -52,7 +52,7 @@ const TEAMS: u32 = 8;
 const FEW_WORKERS: [usize; 5] = [1, 2, 4, 8, 16];
 /// Shards of each worker in a phase with few workers.
 const SHARDS_PER_WORKER: u32 = 10;
-/// Duration of a shard in these phases.
+/// Duration of a shard in these phases, during which a worker sleeps.
 const FEW_SLEEP: Duration = Duration::from_secs(2);
 /// The largest relative deviation of a shard's duration. With equal durations all workers would always request jobs at the same
 /// time.
@@ -103,14 +103,15 @@ fn main() -> anyhow::Result<()> {
     let few_shards = FEW_WORKERS.iter().sum::<usize>() * SHARDS_PER_WORKER as usize;
     let few_shards = u32::try_from(few_shards)?;
     let stages = (settings.shards + few_shards).div_ceil(SHARDS_PER_EVALUATION * TEAMS);
-    let evaluations_queued = QueuedEvaluations::create(&server, stages)?;
+    let queued_evaluations = QueuedEvaluations::create(&server, stages)?;
     let many_shards = stages * TEAMS * SHARDS_PER_EVALUATION - few_shards;
     println!(
         "{} evaluations of {SHARDS_PER_EVALUATION} shards of {EPISODES_PER_SHARD} episodes are queued",
-        evaluations_queued.evaluations.len()
+        queued_evaluations.evaluations.len()
     );
 
     let runtime = Runtime::new()?;
+    // Counts the shards of all evaluations, for all workers.
     let evaluations = Arc::new(Evaluations::new(SHARDS_PER_EVALUATION));
     let (capabilities, url) = (worker_capabilities(&server)?, nats.url());
     let mut simulated_workers = Vec::new();
@@ -127,21 +128,21 @@ fn main() -> anyhow::Result<()> {
     let resumed = server.post("/api/v1/queue/resume", &server.admin_token, &json!({}));
     ensure!(resumed.status().is_success(), "{}", resumed.status());
 
-    let few_phases = few_phases(&runtime, &mut simulated_workers)?;
+    let few_worker_phases = run_few_worker_phases(&runtime, &mut simulated_workers)?;
     let plan = Plan {
         sleep: settings.sleep,
         spread: SPREAD,
         workload: Workload::Shared(AtomicI64::new(many_shards.into())),
     };
     let processes = [server.process_id(), nats.process_id(), process::id()];
-    let many = FullPhase::measure(
+    let full_phase = FullPhase::measure(
         &runtime,
         (&mut simulated_workers, settings.workers),
         plan,
         processes,
-        || evaluations_queued.wait_for_end(&server),
+        || queued_evaluations.wait_for_end(&server),
     )?;
-    report(&settings, &few_phases, &many)
+    report(&settings, &few_worker_phases, &full_phase)
 }
 
 /// The server runs no evaluations in its own slots. Rate limits are off, since all workers have the same address.
@@ -244,7 +245,8 @@ fn worker_capabilities(server: &Server) -> anyhow::Result<WorkerCapabilities> {
     }))?)
 }
 
-fn few_phases(
+/// The phases with few workers, one after the other.
+fn run_few_worker_phases(
     runtime: &Runtime,
     simulated_workers: &mut Vec<SimulatedWorker>,
 ) -> anyhow::Result<Vec<Phase>> {
@@ -288,7 +290,7 @@ struct FullPhase {
     phase: Phase,
     /// From the first request for a job until the server had stored all results.
     stored: Duration,
-    /// Usage of server, NATS and this process, before and after.
+    /// Usage of server, NATS and this process, before and after the phase.
     used: [(Usage, Usage); 3],
     /// CPU seconds of the server's threads.
     threads: BTreeMap<String, f64>,

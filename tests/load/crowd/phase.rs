@@ -21,7 +21,7 @@ impl Phase {
         self.shards() as f64 / self.duration.as_secs_f64()
     }
 
-    /// The part of the workers' time in which they slept, which represents running agents.
+    /// The part of the workers' time in which they slept. Sleeping stands for running agents, so the rest is overhead.
     pub(crate) fn efficiency(&self) -> f64 {
         self.measurements.slept_s / (self.workers as f64 * self.duration.as_secs_f64())
     }

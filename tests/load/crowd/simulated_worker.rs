@@ -29,11 +29,14 @@ use std::{
 };
 use uuid::Uuid;
 
-/// The times of `faceoff worker` (`remote/` in `crates/faceoff-worker`): how long it waits for the server's response and for a job,
-/// its pause after a failure, and how often it renews its *lease*, the right to run a job for a time.
+// The four times are those of `faceoff worker` (`remote/` in `crates/faceoff-worker`).
+/// How long a worker waits for the server's response to a request.
 const RESPONSE_TIMEOUT: Duration = Duration::from_secs(5);
+/// How long a worker's request for a job waits for one; then it sends the next request.
 const PULL_EXPIRY: Duration = Duration::from_secs(5);
+/// Pause after a failure.
 const RETRY_DELAY: Duration = Duration::from_secs(2);
+/// How often a worker renews its *lease*, the right to run a job for a time.
 const RENEWAL_INTERVAL: Duration = Duration::from_millis(500);
 const SLOT: &str = "slot-0";
 /// The server's name in streams and subjects: the default.
@@ -68,7 +71,7 @@ pub(crate) struct SimulatedWorker {
 
 /// The work of one phase.
 pub(crate) struct Plan {
-    /// The duration of a shard.
+    /// The mean duration of a shard, during which the worker sleeps.
     pub(crate) sleep: Duration,
     /// The largest relative deviation of a shard's duration.
     pub(crate) spread: f64,
@@ -103,7 +106,7 @@ pub(crate) struct Measurements {
     pub(crate) files_s: Vec<f64>,
     /// Sending the result, until NATS has stored it.
     pub(crate) result_s: Vec<f64>,
-    /// The total sleeping time of all shards.
+    /// The total time of all shards in which the worker slept instead of running an agent.
     pub(crate) slept_s: f64,
     pub(crate) retries: Retries,
 }

@@ -19,7 +19,8 @@ pub(crate) struct Usage {
     pub(crate) written_bytes: u64,
 }
 
-/// CPU seconds of a process's threads, by id and start. A thread that has ended keeps its last value.
+/// Names and CPU seconds of a process's threads, by thread id and start time, since ids are used again. A thread that has ended keeps
+/// its last value.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Threads(BTreeMap<(u32, u64), (String, f64)>);
 

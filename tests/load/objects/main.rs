@@ -30,7 +30,7 @@ use tokio::{io::AsyncReadExt as _, runtime::Runtime, time::timeout};
 
 /// One-way delays: a round trip takes twice as long.
 const DELAYS: [Duration; 2] = [Duration::ZERO, Duration::from_millis(100)];
-/// Sizes in MiB and rounds: a small recording, one of a large shard, and a bundle.
+/// Sizes in MiB, each with the number of measured rounds: a small recording, one of a large shard, and a bundle.
 const FILES: [(usize, usize); 3] = [(1, 3), (8, 3), (64, 1)];
 /// The default chunk size of async-nats, and the largest that a nats-server accepts by default, less the subject.
 const CHUNKS: [(&str, Option<usize>); 2] = [("default", None), ("large", Some(1_000_000))];

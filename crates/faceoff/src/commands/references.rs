@@ -137,20 +137,24 @@ pub(super) async fn find_evaluation(client: &Client, text: &str) -> anyhow::Resu
     }
 }
 
-/// The evaluation of a team on a day: one that the caller may see before its release, or one of the boards of that day, first of
-/// the current stage.
+/// The evaluation of a team on a day. First it is looked for among those that the caller may see by a token, even before their release.
+/// Then follow the public boards of that day, that of the current stage first.
 async fn find_by_day(client: &Client, team: &str, day: Date) -> anyhow::Result<EvaluationId> {
-    let own =
-        none_on_expected_error(client.evaluations(Some(day)).await, is_hidden)?.unwrap_or_default();
+    let visible = none_on_expected_error(client.evaluations(Some(day)).await, is_access_refused)?
+        .unwrap_or_default();
     let has_name = |name: &str| name.to_lowercase() == team.to_lowercase();
-    if let Some(evaluation) = own.iter().find(|found| has_name(found.team_name.as_str())) {
+    if let Some(evaluation) = visible
+        .iter()
+        .find(|found| has_name(found.team_name.as_str()))
+    {
         return Ok(evaluation.id);
     }
-    let mut names = BTreeSet::new();
-    let stages = none_on_expected_error(client.stages().await, is_hidden)?.unwrap_or_default();
+    let mut teams_with_results = BTreeSet::new();
+    let stages =
+        none_on_expected_error(client.stages().await, is_access_refused)?.unwrap_or_default();
     let other_stages = stages.iter().map(|stage| Some(stage.id));
     for stage in iter::once(None).chain(other_stages) {
-        // A team's newest result up to the day.
+        // With `Latest` the board has each team's newest result up to the day, so its day may be an earlier one.
         let query = BoardQuery {
             stage,
             day: Some(day),
@@ -158,7 +162,7 @@ async fn find_by_day(client: &Client, team: &str, day: Date) -> anyhow::Result<E
             ..BoardQuery::default()
         };
         let has_no_board = |error: &anyhow::Error| {
-            is_hidden(error) || is_refused_with(error, StatusCode::NOT_FOUND)
+            is_access_refused(error) || is_refused_with(error, StatusCode::NOT_FOUND)
         };
         let board = none_on_expected_error(client.board(None, &query).await, has_no_board)?;
         for row in board.into_iter().flat_map(|board| board.rows) {
@@ -166,22 +170,22 @@ async fn find_by_day(client: &Client, team: &str, day: Date) -> anyhow::Result<E
                 return Ok(row.evaluation);
             }
             if row.day == day {
-                names.insert(row.team.to_string());
+                teams_with_results.insert(row.team.to_string());
             }
         }
     }
-    if names.is_empty() {
+    if teams_with_results.is_empty() {
         bail!("no results of {day} are public");
     }
-    let names: Vec<String> = names.into_iter().collect();
+    let names: Vec<String> = teams_with_results.into_iter().collect();
     bail!(
         "{team:?} has no public result of {day}; these teams have one: {}",
         names.join(", ")
     )
 }
 
-/// Whether the caller may not see it.
-fn is_hidden(error: &anyhow::Error) -> bool {
+/// Whether the server refused the request because the caller may not see the data.
+fn is_access_refused(error: &anyhow::Error) -> bool {
     [StatusCode::UNAUTHORIZED, StatusCode::FORBIDDEN]
         .into_iter()
         .any(|status| is_refused_with(error, status))
@@ -249,13 +253,13 @@ mod tests {
         };
         for status in [401, 403] {
             assert_eq!(
-                none_on_expected_error(refused(status), is_hidden).unwrap(),
+                none_on_expected_error(refused(status), is_access_refused).unwrap(),
                 None
             );
         }
         for status in [404, 429, 500] {
             assert!(
-                none_on_expected_error(refused(status), is_hidden).is_err(),
+                none_on_expected_error(refused(status), is_access_refused).is_err(),
                 "{status}"
             );
         }

@@ -119,7 +119,7 @@ fn restore(
         "a backup is restored into its own folder: name an empty or a new one, or replace this one \
         with --replace",
     );
-    // Locked until the end, so that a folder in use is noticed before anything is copied.
+    // A folder that is replaced stays locked until the end. A server that uses it is noticed before anything is copied.
     let lock = match is_empty {
         Ok(()) => None,
         Err(_) if replace => Some(lock_replaced(data)?),

@@ -1,4 +1,4 @@
-//! `faceoff season`: prints the season. Its *secret* draws the episodes of all evaluations and is published at the end; the
+//! `faceoff season`: prints the season. Its *secret* determines the episodes of all evaluations and is published at the end; the
 //! *commitment*, its hash, is public from the start.
 
 use super::{

@@ -1,5 +1,7 @@
 //! `faceoff serve`: API, pages, worker slots and schedule in one process. A *slot* runs one job at a time, e.g. the episodes of an
-//! agent or a game; the *schedule* starts evaluation days.
+//! agent or a game; the *schedule* starts evaluation days. A season is *live*, or *archived* and shown read-only. `resources` are
+//! what both open first, `tasks` the parts of a live server that run until the shutdown, and `priority` keeps requests from
+//! disturbing slots.
 
 mod archived_season;
 mod clock;
@@ -59,7 +61,7 @@ impl ServeCommand {
     /// If the configuration, the data folder, the address or the sandbox is unusable.
     pub fn run(self) -> anyhow::Result<()> {
         self.log_format.start()?;
-        // What the server writes is closed to other users; what agents read gets its modes explicitly.
+        // Other users of the host may not read what the server writes. Files that agents read get other modes explicitly.
         rustix::process::umask(Mode::RWXG | Mode::RWXO);
         let config = self.load_config()?;
         let archived = super::block_on(archived_season(&config.server.data_dir))?;
@@ -100,8 +102,8 @@ async fn archived_season(data_dir: &Path) -> anyhow::Result<Option<ArchivedSeaso
 
 /// Divides the file descriptors of this process among slots and connections; returns the limits of connections.
 fn assign_descriptors(config: &Config) -> anyhow::Result<ConnectionLimits> {
-    let wanted = config.connections.limits();
-    let descriptors = Descriptors::divide(Descriptors::raise(), config.slots(), &wanted)?;
+    let requested = config.connections.limits();
+    let descriptors = Descriptors::divide(Descriptors::raise(), config.slots(), &requested)?;
     tracing::info!(
         limit = descriptors.limit,
         reserved = descriptors.reserved,
@@ -109,11 +111,11 @@ fn assign_descriptors(config: &Config) -> anyhow::Result<ConnectionLimits> {
         per_address = descriptors.per_address,
         "file descriptors assigned"
     );
-    if descriptors.connections < wanted.open {
+    if descriptors.connections < requested.open {
         tracing::warn!(
-            wanted = wanted.open,
+            wanted = requested.open,
             "fewer connections than connections.most: raise the limit of file descriptors (ulimit -n, LimitNOFILE=)"
         );
     }
-    Ok(descriptors.limits(wanted))
+    Ok(descriptors.limits(requested))
 }

@@ -29,7 +29,7 @@ pub(super) const fn is_silent_start(fault: &AgentFaultKind) -> bool {
 }
 
 /// Prints the likely causes if an agent has not answered after a while. The agents start one after the other; `ended_starts` has
-/// a message when the start of each is over, and ends with the run.
+/// a message when the start of each has ended, and is closed when the evaluation or game ends.
 pub(super) fn explain(
     agents: &[&str],
     ended_starts: &Receiver<()>,
@@ -50,9 +50,9 @@ pub(super) fn explain(
     }
 }
 
-/// Why a run ended after the silent start of an agent.
-pub(super) fn stop_reason(agent: &str, run: &str, fault: &AgentFault) -> String {
+/// Why an evaluation or game was stopped after the silent start of an agent. `stopped` names it: `evaluation` or `game`.
+pub(super) fn stop_reason(agent: &str, stopped: &str, fault: &AgentFault) -> String {
     format!(
-        "{agent} never answered, so the {run} was stopped after its first start: {fault}. {LIKELY_CAUSES}"
+        "{agent} never answered, so the {stopped} was stopped after its first start: {fault}. {LIKELY_CAUSES}"
     )
 }

@@ -39,6 +39,7 @@ const MAX_INTERVAL: Duration = Duration::from_secs(60);
 /// Output of `--json`.
 #[derive(Debug, PartialEq, Serialize)]
 struct TeamStatus {
+    /// The team's state from the route `/me`.
     me: MeView,
     /// The newest first.
     evaluations: Vec<EvaluationView>,

@@ -35,6 +35,7 @@ pub(super) fn storage_line(storage: &StorageView) -> String {
             storage.unmeasured_datasets
         ));
     }
+    // Datasets of evaluations that do not count: trials, and re-evaluations before an organiser decides about them.
     if let Some(proposed) = storage.proposal_bytes.filter(|bytes| *bytes > 0) {
         line.push_str(&format!(
             "; trials and proposals, {}",

@@ -45,7 +45,8 @@ pub(super) enum TokenAction {
         #[arg(id = "id", value_name = "ID")]
         token: TokenId,
     },
-    /// Revoke a token or end a session. Unless it is your own, the tokens, invitations and webhooks that were made with it end, too
+    /// Revoke a token or end a session. The tokens, invitations and webhooks that were made with it end, too, unless it is one of
+    /// your own
     Revoke {
         /// The token's id
         #[arg(id = "id", value_name = "ID")]
@@ -53,7 +54,7 @@ pub(super) enum TokenAction {
         /// Keep the tokens, invitations and webhooks that were made with the token
         #[arg(long)]
         keep_made: bool,
-        /// End the tokens, invitations and webhooks that were made with the token, even if it is your own
+        /// End the tokens, invitations and webhooks that were made with the token, even if the token is one of your own
         #[arg(long, conflicts_with = "keep_made")]
         end_made: bool,
     },
@@ -120,6 +121,7 @@ pub(super) async fn run_action(
             keep_made,
             end_made,
         } => {
+            // `None`: the server decides by the token's owner.
             let made = match (keep_made, end_made) {
                 (true, _) => Some(CreatedCredentials::Keep),
                 (false, true) => Some(CreatedCredentials::End),

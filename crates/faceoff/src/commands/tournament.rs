@@ -36,6 +36,7 @@ enum Action {
     /// Show ratings of the submissions, by results and by goals, and head-to-head records
     Ratings(TournamentOrNewest),
     /// Show how often each team was champion in replays of the schedule with new seeds
+    // The command has the name of the API's route: the shares show how certain the result is.
     #[command(name = "certainty")]
     ChampionShares(TournamentOrNewest),
     /// Withdraw your team from a tournament permanently; without --confirm, only list the effects

@@ -158,8 +158,9 @@ impl VerifyCommand {
 
     fn verify_dataset(&self) -> Result<SimulatedEvaluation, Failure> {
         let dataset = Dataset::open(&self.dataset, competition())?;
-        let archive = dataset.archive()?.map(|digest| digest.blake3);
-        check_hash(self.blake3.as_ref(), archive.as_deref())?;
+        let archive_hash = dataset.archive()?.map(|digest| digest.blake3);
+        check_hash(self.blake3.as_ref(), archive_hash.as_deref())?;
+        // The claim that the dataset's seeds are derived from this secret for this day.
         let claim = self.secret.zip(self.day).map(|(secret, day)| SeasonClaim {
             secret,
             commitment: self.commitment.clone(),
@@ -190,7 +191,7 @@ impl VerifyCommand {
             seconds: time.as_secs_f64(),
             steps_per_s: verified.steps as f64 / time.as_secs_f64(),
             season: claim.is_some(),
-            blake3: archive,
+            blake3: archive_hash,
             result: verified.result,
         })
     }

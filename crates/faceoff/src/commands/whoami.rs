@@ -58,6 +58,7 @@ pub(super) fn whoami_text(caller: &CallerView) -> String {
     let team = caller.team.as_ref();
     let of_team = team.map(|team| format!(" of the team {} ({})", team.name, team.id));
     let role = match caller.role.as_str() {
+        // Roles by their names in the API: a token of a team belongs to no user, `host` is the operator.
         "team" => "API client",
         "host" => "operator, with the rights of an organiser",
         "organiser" => "organiser",

@@ -98,7 +98,7 @@ impl WorkerCommand {
         );
         capabilities.labels = self.labels;
         let http = files_client(config.nats.ca_file.as_deref())?;
-        // The runtimes' files in memory, kept as long as agents run.
+        // The copy of the runtimes' files in memory lasts as long as this value, so as long as agents run.
         let _memory_copy = copy_to_memory(&mut agent.runtimes, config.sandbox.resident_bytes);
         let scratch_dir = config.scratch_dir();
         fs::create_dir_all(&scratch_dir)

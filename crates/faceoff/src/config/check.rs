@@ -8,7 +8,7 @@ use faceoff_types::{IMAGE_RUNTIME, Seed, url_without_password};
 use reqwest::header::HeaderName;
 use std::{collections::HashSet, str::FromStr as _};
 
-/// More slots per CPU than this would make no progress.
+/// With more slots per CPU than this, evaluations would hardly progress.
 const MAX_SLOTS_PER_CPU: usize = 4;
 
 impl Config {
@@ -61,7 +61,7 @@ impl Config {
         }
     }
 
-    /// Refuses perturbations with which a season with this seed cannot be played.
+    /// Refuses magnitudes of perturbations with which the robot of a season with this mismatch seed cannot be simulated.
     pub fn check_season_magnitudes(&self, mismatch_seed: Seed) -> anyhow::Result<()> {
         let magnitudes = self.rules().variation.perturbations;
         simulator()
@@ -140,8 +140,8 @@ impl Config {
             "evaluation.tasks: expected at least one task"
         );
         let mut rules = self.rules();
-        let mut unique = HashSet::new();
-        if let Some(duplicate) = evaluation.tasks.iter().find(|task| !unique.insert(**task)) {
+        let mut seen = HashSet::new();
+        if let Some(duplicate) = evaluation.tasks.iter().find(|task| !seen.insert(**task)) {
             bail!("evaluation.tasks: {duplicate} is listed twice");
         }
         let checked = competition().check_rules(&mut rules);

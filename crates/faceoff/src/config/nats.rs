@@ -58,7 +58,7 @@ impl NatsSection {
 
     /// Checks the conditions that the types do not express.
     pub(super) fn check(&self) -> anyhow::Result<()> {
-        let has_scheme = |url: &Option<String>, schemes: &[&str]| {
+        let is_absent_or_valid = |url: &Option<String>, schemes: &[&str]| {
             url.as_ref().is_none_or(|url| {
                 let rest = schemes.iter().find_map(|scheme| url.strip_prefix(scheme));
                 rest.is_some_and(|rest| {
@@ -73,18 +73,18 @@ impl NatsSection {
             url_without_password(url.as_deref().unwrap_or_default()).into_owned()
         };
         ensure!(
-            has_scheme(&self.url, &["nats://", "tls://"]),
+            is_absent_or_valid(&self.url, &["nats://", "tls://"]),
             "nats.url: expected nats://HOST:PORT or tls://HOST:PORT without user and password (nats.nkey_file identifies this \
              program), got {:?}",
             shown(&self.url)
         );
         ensure!(
-            has_scheme(&self.files_url, &["http://", "https://"]),
+            is_absent_or_valid(&self.files_url, &["http://", "https://"]),
             "nats.files_url: expected http://HOST:PORT or https://HOST without a password and a trailing slash, got {:?}",
             shown(&self.files_url)
         );
         ensure!(
-            has_scheme(&self.bucket, &["s3://"]),
+            is_absent_or_valid(&self.bucket, &["s3://"]),
             "nats.bucket: expected s3://BUCKET or s3://BUCKET/PREFIX without a trailing slash, got {:?}",
             shown(&self.bucket)
         );

@@ -117,7 +117,8 @@ impl RuntimeConfig {
         }
     }
 
-    /// The runtime for the sandbox. For a folder without Python, its path does not exist.
+    /// The runtime for the sandbox. For a folder without Python it names a path that does not exist, so that agents fail instead of
+    /// using another Python.
     #[must_use]
     pub fn runtime(&self) -> Runtime {
         match self {

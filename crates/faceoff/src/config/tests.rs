@@ -252,6 +252,7 @@ fn impossible_value_is_refused() {
             "{error}"
         );
     }
+    // The outcome on a host with the CPUs 0 and 1.
     let on_two_cpus = |text: &str| {
         let config = Config::parse(text).unwrap();
         config

@@ -76,7 +76,7 @@ impl Rules {
         Ok(Self(rules.build().with_context(reading)?))
     }
 
-    /// Whether a path, relative to the folder, is left out. The content of a folder that is left out is not checked.
+    /// Whether the rules leave out a path, relative to the folder. Callers do not ask about the content of a folder that is left out.
     pub(super) fn leaves_out(&self, path: &Path, is_folder: bool) -> bool {
         matches!(self.0.matched(path, is_folder), Match::Ignore(_))
     }

@@ -33,7 +33,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn changed_file_is_truncated_or_refused() {
+    fn longer_file_is_truncated_and_shorter_one_refused() {
         let read = |bytes| {
             let mut content = Vec::new();
             SizedReader::new(&b"abc"[..], bytes)

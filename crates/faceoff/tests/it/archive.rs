@@ -1,4 +1,5 @@
-//! The season's archive: exported from a server, imported, and served read-only.
+//! The season's archive: exported from a server, imported into a data folder, and served read-only. The *public edition* has what
+//! visitors may see, the *organiser edition* everything.
 
 use crate::program::{command, faceoff_in};
 use faceoff_airhockey::HIT;
@@ -350,7 +351,7 @@ async fn exported_season_is_shown_on_another_host() {
     assert!(board.1.contains("Alpha"), "{board:?}");
     for name in ["public", "all"] {
         let folder = other_host.path().to_owned();
-        // The next start removes what an interrupted export has left.
+        // Files of an export that was interrupted. The next start must remove them.
         let interrupted = folder.join(name).join("uploads/archive-left");
         fs::create_dir_all(&interrupted).unwrap();
         fs::write(interrupted.join("snapshot.sqlite3"), "with secrets").unwrap();
@@ -428,22 +429,28 @@ async fn refused_import_leaves_nothing() {
     let database = folder.join("database");
     snapshot.finish(&database).await.unwrap();
     let database = fs::read(database).unwrap();
-    let running = {
+    // The database of a live server, which was not made for an archive.
+    let live_database = {
         store.checkpoint().await.unwrap();
         store.close().await;
         fs::read(folder.join("running/faceoff.sqlite3")).unwrap()
     };
     fs::write(folder.join("text"), "no archive").unwrap();
-    write_archive(folder, "bare", &[("README.txt", b"")], Edition::Public);
     write_archive(
         folder,
-        "running.tar.zst",
-        &[("database.sqlite3", &running)],
+        "without-database",
+        &[("README.txt", b"")],
         Edition::Public,
     );
     write_archive(
         folder,
-        "other",
+        "live-database.tar.zst",
+        &[("database.sqlite3", &live_database)],
+        Edition::Public,
+    );
+    write_archive(
+        folder,
+        "mixed-editions",
         &[("database.sqlite3", &database)],
         Edition::Organiser,
     );
@@ -459,16 +466,16 @@ async fn refused_import_leaves_nothing() {
     for (archive, expected) in [
         ("none", &["none is not imported", "No such file"][..]),
         ("text", &["expected a .tar.zst"]),
-        ("bare", &["it contains no database.sqlite3"]),
+        ("without-database", &["it contains no database.sqlite3"]),
         (
-            "running.tar.zst",
+            "live-database.tar.zst",
             &[
                 "database is refused",
                 "description of the archive is missing",
             ],
         ),
         (
-            "other",
+            "mixed-editions",
             &[
                 "its manifest is of the organiser edition",
                 "its database of the public edition",
@@ -527,16 +534,16 @@ async fn data_folder_of_an_earlier_version_can_be_archived() {
         snapshot.finish(&file).await.unwrap();
         let archived = Store::import(target.path(), now()).await.unwrap();
         assert_eq!(archived.imported_at, Some(now()));
-        let shown = Store::open(target.path()).await.unwrap();
+        let imported = Store::open(target.path()).await.unwrap();
         let stage = store.stages().await.unwrap().remove(0);
         let revision = store.board_revision(&stage).await.unwrap();
-        let rows = shown.board(stage.id, revision).await.unwrap();
+        let rows = imported.board(stage.id, revision).await.unwrap();
         // The second day is unfinished, so the archive shows the first.
         assert_eq!(rows.len(), 1, "{rows:?}");
         for row in rows {
             let original = store.evaluation(row.evaluation).await.unwrap();
             assert!(original.released_at.is_some());
-            assert_eq!(shown.evaluation(row.evaluation).await.unwrap(), original);
+            assert_eq!(imported.evaluation(row.evaluation).await.unwrap(), original);
         }
     }
 }
@@ -559,7 +566,7 @@ async fn killed_import_creates_all_of_the_folder_or_none() {
     let database = folder.join("database");
     snapshot.unwrap().finish(&database).await.unwrap();
     let database = fs::read(database).unwrap();
-    // Each file is synced, so many files take a while.
+    // Each file is synced to the disk, so with many files the import takes a while.
     let names: Vec<String> = (0..60)
         .map(|number| format!("artifacts/datasets/{number}.zip"))
         .collect();
@@ -568,7 +575,7 @@ async fn killed_import_creates_all_of_the_folder_or_none() {
     write_archive(folder, "season.tar.zst", &files, Edition::Public);
     let (mut killed, mut complete) = (0, 0);
     for round in 0_u64.. {
-        let mut child = command(&["import", "season.tar.zst", "--data", "shown"])
+        let mut child = command(&["import", "season.tar.zst", "--data", "imported"])
             .current_dir(folder)
             .stdout(Stdio::null())
             .stderr(Stdio::null())
@@ -578,13 +585,13 @@ async fn killed_import_creates_all_of_the_folder_or_none() {
         std::thread::sleep(std::time::Duration::from_millis(20 * round * round));
         child.kill().unwrap();
         let ended = child.wait().unwrap();
-        let shown = folder.join("shown");
-        if shown.exists() {
-            let found = Store::archived_in(&shown).await.unwrap().unwrap();
+        let imported = folder.join("imported");
+        if imported.exists() {
+            let found = Store::archived_in(&imported).await.unwrap().unwrap();
             assert!(found.imported_at.is_some());
-            let datasets = fs::read_dir(shown.join("artifacts/datasets")).unwrap();
+            let datasets = fs::read_dir(imported.join("artifacts/datasets")).unwrap();
             assert_eq!(datasets.count(), names.len());
-            fs::remove_dir_all(&shown).unwrap();
+            fs::remove_dir_all(&imported).unwrap();
             complete += 1;
         } else {
             assert!(!ended.success(), "{ended}");
@@ -598,7 +605,7 @@ async fn killed_import_creates_all_of_the_folder_or_none() {
     // A complete import removes what the killed ones have left.
     stdout(&faceoff_in(
         folder,
-        &["import", "season.tar.zst", "--data", "shown"],
+        &["import", "season.tar.zst", "--data", "imported"],
     ));
-    assert!(!folder.join("shown.importing").exists());
+    assert!(!folder.join("imported.importing").exists());
 }

@@ -4,7 +4,7 @@ use crate::program::{LONG_TIME_LIMITS, SEED, agent, faceoff_in, read_json, text}
 use serde_json::Value;
 use std::{fs, path::Path};
 
-/// Evaluates an agent into the folder `out` of `folder`.
+/// Evaluates the example agent `name` in the working folder `folder`; the results are written to its subfolder `out`.
 fn eval(folder: &Path, name: &str, out: &str, args: &[&str]) {
     let bundle = agent(name);
     let bundle = bundle.to_str().unwrap();

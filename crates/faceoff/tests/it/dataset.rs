@@ -217,7 +217,7 @@ fn export_refers_to_the_python_package() {
 #[test]
 fn workers_and_shards_only_change_times() {
     let dir = tempfile::tempdir().unwrap();
-    // These depend on measured times.
+    // Fields that depend on measured times.
     let measured = ["penalty_points", "computation_time", "fault"];
     let mut runs = Vec::new();
     for workers in ["1", "2", "8"] {

@@ -23,7 +23,7 @@ fn eval(bundle: &Path, out: &Path, args: &[&str]) -> Output {
         .unwrap()
 }
 
-/// `results.json` without measured values.
+/// `results.json` without values that depend on measured times.
 fn result(out: &Path) -> serde_json::Value {
     let mut result = read_json(&out.join("results.json"));
     for key in ["penalty_points", "tier", "timing"] {
@@ -234,7 +234,7 @@ fn missing_runtime_is_reported_once_with_its_fix() {
     };
     let folder = dir.path().join("share/faceoff/python3-ml");
     let command = format!("docker/runtime.sh {}", folder.display());
-    // Unless this machine has one where organisers put it.
+    // Unless this machine has the runtime in the folder where organisers put it.
     if !Path::new("/srv/faceoff/python3-ml").exists() {
         refused("python3-ml", &[&command]);
     }

@@ -327,7 +327,8 @@ fn series_alternates_sides_and_counts_goals_by_agent() {
     fs::write(broken.join("agent.py"), "import torch_of_olympia").unwrap();
     let out = dir.path().join("out");
     let hold = hold();
-    // Eleven faults take 7,520 steps, because a rally against an arm that holds still ends with a foul.
+    // The broken agent has a fault in each rally and forfeits with the eleventh. That takes 7,520 steps, because a rally against an arm
+    // that holds still only ends with a foul.
     let args = ["--steps", "9000", "--games", "2", "--profile", "ideal"];
     let output = play([&hold, &broken], &out, &args);
     assert!(output.status.success(), "{}", text(&output.stderr));

@@ -1,4 +1,4 @@
-//! The program under test, and what several tests run it with.
+//! Runs the program under test; configurations, agents and helpers that several tests use.
 
 use serde_json::Value;
 use std::{
@@ -15,7 +15,7 @@ pub const LONG_TIME_LIMITS: &str = concat!(
 /// An arbitrary seed, which fixes the episodes.
 pub const SEED: &str = "5";
 
-/// A call of the program, which can be completed.
+/// A command of the program with these arguments, to which a test can add.
 pub fn command(args: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_faceoff"));
     command.args(args);

@@ -9,7 +9,8 @@ use std::{
 };
 use tempfile::TempDir;
 
-/// An evaluation with two episodes per task, of an agent that violates limits and whose name must be escaped.
+/// A scratch folder with an evaluation in its subfolder `out`: two episodes per task. The agent violates limits, and its name must
+/// be escaped in HTML.
 pub fn scratch_with_evaluation() -> &'static Path {
     static DIR: OnceLock<TempDir> = OnceLock::new();
     let dir = DIR.get_or_init(|| {

@@ -77,7 +77,7 @@ fn game_page_is_self_contained_and_links_its_events() {
         .find(|line| line.contains(foul) && line.starts_with("<li"));
     let line = line.unwrap_or_else(|| panic!("{foul}\n{page:.4000}"));
     assert!(line.contains(&format!(">{clock}</a>")), "{line}");
-    // 15.02 s of the puck on a side, two seconds before.
+    // The foul is 15.02 s after the start, and its link jumps to two seconds before that.
     assert!(line.contains("href=\"#t=13."), "{line}");
     assert!(page.contains("3 points for reckless: end effector limit violated in "));
     let rest = page.replace("http://www.w3.org/2000/svg", "");

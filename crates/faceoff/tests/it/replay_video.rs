@@ -16,7 +16,7 @@ use std::{
 use tempfile::TempDir;
 
 const SIZE: [usize; 2] = [960, 606];
-/// Frames of the last moment of a GIF.
+/// Copies of a GIF's last frame.
 const FINAL_FRAMES: usize = 25;
 
 fn write_episode_video(file: &Path, options: &[&str]) -> Output {

@@ -13,7 +13,8 @@ pub(super) struct PlayOptions {
     /// The second side's agent; it may be the same bundle
     pub(super) bundle_b: PathBuf,
     /// Control steps per game; 50 steps are one second
-    // A window is a stretch of 500 control steps, in which each kind of violation counts at most once.
+    // The default is the length of a tournament game: 90 windows. A window is a stretch of 500 control steps, in which each kind
+    // of violation counts at most once.
     #[arg(long, value_name = "N", default_value_t = GAME_WINDOWS * WINDOW_STEPS, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_GAME_STEPS)))]
     pub(super) steps: u32,
     /// Number of mirrored pairs, two games on one seed with swapped sides; recordings go to pair-K/half-1 and
@@ -23,13 +24,14 @@ pub(super) struct PlayOptions {
     /// Number of games, each with its own seed and alternating home sides; recordings go to game-K
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub(super) games: Option<u32>,
-    /// Perturbations: ideal, one factor's name, or evaluation
+    /// Perturbations of the simulator: ideal (none), evaluation (as on the server), or the name of a single one, such as delay
     #[arg(long, default_value = "evaluation", value_parser = parse_profile)]
     pub(super) profile: Profile,
     /// A number, or 64 hexadecimal digits; the same seed gives the same serves and noise everywhere
     #[arg(long, default_value = "0")]
     pub(super) seed: Seed,
-    /// Seed of the season's model mismatch [default: derived from the seed]
+    /// Seed of the model mismatch, by which the simulated robot differs from its published model in a season [default: derived
+    /// from --seed]
     #[arg(long, value_name = "HEX")]
     pub(super) mismatch_seed: Option<Seed>,
     /// Folder for results and recordings; files of an earlier game are replaced

@@ -27,7 +27,8 @@ pub(super) fn play(
     count: u32,
     results: &Results,
 ) -> anyhow::Result<()> {
-    // For each game of a pair: whether the sides are swapped.
+    // The games of one pair or, without pairs, the single game: whether each has swapped sides, so that the second agent is home.
+    // Single games swap them by their number instead, below.
     let halves: &[bool] = match kind {
         SeriesKind::MirroredPairs => &[false, true],
         SeriesKind::Games => &[false],

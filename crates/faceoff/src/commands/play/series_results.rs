@@ -18,7 +18,7 @@ pub(super) enum SeriesKind {
     Games,
 }
 
-/// Settings of a series. Pairs are in the sequence of the command line.
+/// Settings of a series. Arrays of two have the agent that the command line names first at index 0.
 pub(super) struct Series<'a> {
     pub(super) kind: SeriesKind,
     /// Requested number of pairs or games.
@@ -28,7 +28,7 @@ pub(super) struct Series<'a> {
     pub(super) spec: &'a GameSpec,
 }
 
-/// `results.json` of a series. Pairs of numbers are in the sequence of the command line.
+/// `results.json` of a series. Arrays of two have the agent that the command line names first at index 0.
 #[derive(Debug, Serialize)]
 pub(super) struct SeriesResults {
     pub(super) series: SeriesKind,
@@ -46,13 +46,14 @@ pub(super) struct SeriesResults {
     pub(super) draws: u32,
     /// The first agent's goals minus the second's, per pair or per game.
     pub(super) goal_difference: GoalDifference,
-    /// The variance of mirrored pairs compared with that of independent games; absent with fewer than two pairs.
+    /// The variance of the goal difference of mirrored pairs compared with that of independent games; absent with fewer than two pairs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) spread: Option<VarianceComparison>,
     pub(super) games: Vec<SeriesGame>,
 }
 
-/// One game of a series. Pairs of numbers are in the sequence of the command line, regardless of the home side.
+/// One game of a series. Arrays of two have the agent that the command line names first at index 0, whether it plays at home or
+/// not.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct SeriesGame {
     /// Folder of the recording.
@@ -61,14 +62,14 @@ pub(super) struct SeriesGame {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) pair: Option<u32>,
     seed: Seed,
-    /// The home agent, 0 or 1.
+    /// Index of the agent that plays as the home side, 0 or 1.
     home: u32,
     pub(super) goals: [u32; 2],
     fouls: [u32; 2],
     /// The counted score, including points for fouls; after a forfeit 10 : 0, or a larger lead.
     pub(super) score: [u32; 2],
     penalty_points: [f64; 2],
-    /// 0 or 1; `None`: a draw.
+    /// Index of the agent that won, 0 or 1; `None`: a draw.
     pub(super) winner: Option<u32>,
     #[serde(flatten)]
     reason: ResultReason,
@@ -78,6 +79,7 @@ pub(super) struct SeriesGame {
 }
 
 impl SeriesGame {
+    /// The game with this score. `swapped`: the second agent of the command line played as the home side.
     pub(super) fn new(
         score: &GameScore,
         folder: String,

@@ -1,4 +1,5 @@
-//! Draws a recorded game, and prints its result and events.
+//! Draws a recorded game, and prints its result and events. A game is a sequence of *rallies*, each from a serve to its end.
+//! `motion` is what the page's script animates, `clock` formats times of the game.
 
 mod clock;
 mod events;
@@ -26,10 +27,10 @@ pub fn draw(path: &Path, rally: Option<u32>, output: &Output) -> anyhow::Result<
         Format::Svg => output.write(page::svg(&game, chosen)?)?,
         Format::Video(video) => {
             let scene = scene(&game);
-            let span = chosen.map_or(scene.whole(), |rally| {
+            let shown_samples = chosen.map_or(scene.whole(), |rally| {
                 [page::first_sample(rally), rally.end_step()].map(|sample| sample as usize)
             });
-            video.write(&scene, span, &output.file)?;
+            video.write(&scene, shown_samples, &output.file)?;
         }
     }
     let events = events::list(&game);
@@ -54,15 +55,15 @@ pub fn draw(path: &Path, rally: Option<u32>, output: &Output) -> anyhow::Result<
                 .map(|event| format!("{:>8}  {}", clock::text(event.game_step), event.text)),
         );
         for (agent, side) in game.agents.iter().zip(&score.sides) {
-            let count = |count: u32, unit: &str| {
+            let counted = |count: u32, unit: &str| {
                 format!("{count} {unit}{}", if count == 1 { "" } else { "s" })
             };
             lines.push(format!(
                 "{agent}: {}, {}, {:.1} penalty points, {}",
-                count(side.goals, "goal"),
-                count(side.fouls, "foul"),
+                counted(side.goals, "goal"),
+                counted(side.fouls, "foul"),
                 side.penalty_points,
-                count(side.faults, "fault")
+                counted(side.faults, "fault")
             ));
         }
         lines.push(output.file.display().to_string());

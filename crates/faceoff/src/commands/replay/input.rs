@@ -18,7 +18,7 @@ pub enum Input {
 const EXPECTED: &str = "game.zip, a side's zip file of a game, the folder of faceoff play, dataset.zip, or the folder of faceoff eval";
 
 impl Input {
-    /// Finds the recording. `game` is the number of a game of a series; `is_episode`: an episode is named.
+    /// Finds the recording. `game` is the number of a game of a series; `is_episode`: the command line names an episode.
     pub fn find(path: &Path, game: Option<u32>, is_episode: bool) -> anyhow::Result<Self> {
         let metadata = fs::metadata(path)
             .with_context(|| format!("{}: expected {EXPECTED}", path.display()))?;
@@ -33,7 +33,9 @@ impl Input {
             false => Vec::new(),
         };
         if !series.is_empty() {
-            return Ok(Self::Game(path.join(choose(path, &series, game)?)));
+            return Ok(Self::Game(
+                path.join(choose_game_folder(path, &series, game)?),
+            ));
         }
         if game.is_some() {
             bail!(
@@ -55,7 +57,11 @@ impl Input {
 }
 
 /// The folder of the chosen game of a series.
-fn choose<'a>(path: &Path, series: &'a [String], game: Option<u32>) -> anyhow::Result<&'a str> {
+fn choose_game_folder<'a>(
+    path: &Path,
+    series: &'a [String],
+    game: Option<u32>,
+) -> anyhow::Result<&'a str> {
     let count = series.len();
     let range = match (&series[0], &series[count - 1]) {
         (_, _) if count == 1 => format!("it has 1 game, {}: --game 1", series[0]),

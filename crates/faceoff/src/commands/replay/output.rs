@@ -5,6 +5,7 @@ use crate::commands::atomic_file::AtomicFile;
 use anyhow::bail;
 use std::path::{Path, PathBuf};
 
+/// What is drawn into the file.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Format {
     Html,
@@ -31,7 +32,7 @@ impl Format {
 pub struct Output {
     pub file: PathBuf,
     pub format: Format,
-    /// Print JSON.
+    /// Print the summary of the recording as JSON instead of text.
     pub json: bool,
 }
 

@@ -12,7 +12,7 @@ use faceoff_types::escape_unprintable;
 pub const WIDTH_PX: u32 = 900;
 /// Height of the two lines of text above the table in the picture.
 pub const TITLE_PX: u32 = 58;
-/// Height of the table as a share of its width in the picture, without its empty lower margin.
+/// Height of the drawn table as a fraction of the picture's width; the empty margin below the table is left out.
 pub const TABLE_ASPECT: f64 = 0.55;
 
 #[derive(Template)]

@@ -29,9 +29,9 @@ const COLOURS: [RGBColor; 7] = [
 struct Chart {
     caption: String,
     lines: Vec<Line>,
-    /// Limits, drawn as red lines.
-    bounds: Vec<f64>,
-    /// The plot shows at most this range of values.
+    /// Limits of the values, drawn as red lines.
+    limits: Vec<f64>,
+    /// Values outside of this range are drawn at its edge.
     max_range: Range<f64>,
 }
 
@@ -85,7 +85,7 @@ fn charts(recording: &EpisodeRecording) -> Vec<Chart> {
             .dotted(),
             Line::from_start("true", recording.puck.iter().map(|position| position[axis])),
         ],
-        bounds: Vec::new(),
+        limits: Vec::new(),
         max_range: f64::MIN..f64::MAX,
     };
     // `constraint` is an index of `CONSTRAINTS`; `scale` converts its unit to the chart's.
@@ -105,7 +105,7 @@ fn charts(recording: &EpisodeRecording) -> Vec<Chart> {
                 Line::from_start("x", recording.mallet.iter().map(|position| position[0])),
                 Line::from_start("y", recording.mallet.iter().map(|position| position[1])),
             ],
-            bounds: Vec::new(),
+            limits: Vec::new(),
             max_range: f64::MIN..f64::MAX,
         },
         Chart {
@@ -119,19 +119,19 @@ fn charts(recording: &EpisodeRecording) -> Vec<Chart> {
                     Line::after_steps(&format!("{}", joint + 1), shares)
                 })
                 .collect(),
-            bounds: vec![-100.0 * LIMIT_FRACTION, 100.0 * LIMIT_FRACTION],
+            limits: vec![-100.0 * LIMIT_FRACTION, 100.0 * LIMIT_FRACTION],
             max_range: -120.0..120.0,
         },
         Chart {
             caption: "constraints (mm): violated above 0".to_owned(),
             lines: vec![constraint_line(2, 1e3), constraint_line(3, 1e3)],
-            bounds: vec![0.0],
+            limits: vec![0.0],
             max_range: -60.0..40.0,
         },
         Chart {
             caption: "constraints (rad, rad/s): violated above 0".to_owned(),
             lines: vec![constraint_line(0, 1.0), constraint_line(1, 1.0)],
-            bounds: vec![0.0],
+            limits: vec![0.0],
             max_range: -1.5..0.5,
         },
         Chart {
@@ -140,7 +140,7 @@ fn charts(recording: &EpisodeRecording) -> Vec<Chart> {
                 "per step",
                 recording.computation_time_s.iter().map(|s| 1e3 * s),
             )],
-            bounds: vec![1e3 * COMPUTATION_TIME_LIMITS_S[0]],
+            limits: vec![1e3 * COMPUTATION_TIME_LIMITS_S[0]],
             max_range: 0.0..f64::MAX,
         },
     ]
@@ -184,7 +184,7 @@ impl Chart {
             .map(|(_, value)| *value);
         let values = values.map(|value| value.clamp(self.max_range.start, self.max_range.end));
         let (low, high) = values
-            .chain(self.bounds.iter().copied())
+            .chain(self.limits.iter().copied())
             .fold((f64::MAX, f64::MIN), |(low, high), value| {
                 (low.min(value), high.max(value))
             });
@@ -222,8 +222,8 @@ impl Chart {
             .y_label_formatter(&|value| format!("{}", (value * 1e3).round() / 1e3 + 0.0))
             .label_style(("sans-serif", 11))
             .draw()?;
-        for bound in &self.bounds {
-            chart.draw_series(LineSeries::new([(0.0, *bound), (end_s, *bound)], RED))?;
+        for limit in &self.limits {
+            chart.draw_series(LineSeries::new([(0.0, *limit), (end_s, *limit)], RED))?;
         }
         for (line, colour) in self.lines.iter().zip(COLOURS) {
             let shown = line

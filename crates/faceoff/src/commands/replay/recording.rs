@@ -41,7 +41,7 @@ pub struct EpisodeRecording {
     pub mallet: Vec<[f64; 2]>,
     /// x, y of the opponent's mallet, from the first step on; empty without an opponent.
     pub opponent: Vec<[f64; 2]>,
-    /// Joint speeds as a fraction of their limits, after each step.
+    /// Filtered joint velocities as a fraction of their limits, after each step.
     pub speed_share: Vec<[f64; JOINTS]>,
     /// Joint position (rad), joint velocity (rad/s), end effector (m), elbow and wrist (m): above 0 if violated, after
     /// each step.
@@ -50,7 +50,7 @@ pub struct EpisodeRecording {
     pub computation_time_s: Vec<f64>,
 }
 
-/// The groups of [`EpisodeRecording::constraints`]: name, points, unit.
+/// The groups of [`EpisodeRecording::constraints`]: name, penalty points for an episode with a violation, unit.
 pub const CONSTRAINTS: [(&str, f64, &str); 4] = [
     ("joint position", JOINT_POS_POINTS, "rad"),
     ("joint velocity", JOINT_VEL_POINTS, "rad/s"),
@@ -68,7 +68,7 @@ const PUCK: [&str; 6] = [
     "puck_yaw_rate",
 ];
 
-/// Columns of the state before the first step.
+/// Values of the state before the first step, by the names of their columns.
 fn initial<const N: usize>(record: &EpisodeRecord, names: [&str; N]) -> anyhow::Result<[f64; N]> {
     let columns = &competition().recording.state;
     let mut values = [0.0; N];
@@ -110,7 +110,7 @@ impl EpisodeRecording {
         };
         let start = initial(&record, ["ee_x", "ee_y"])?;
         let mallet = columns.rows(["ee_x", "ee_y"])?.into_iter();
-        // The other robot is on the opposite side, rotated by 180°.
+        // Positions of the opponent are recorded in the frame of its own base, which is on the opposite side, rotated by 180°.
         let opponent_to_table_frame = |[x, y]: [f64; 2]| [TABLE.base_x_m - x, -y];
         let opponent = match columns.is_absent("opponent_ee_x")? {
             true => Vec::new(),

@@ -11,7 +11,7 @@ pub const END: &str = "</g>\n</svg>\n";
 
 /// The colours of paths: of the first side, the second, and the puck.
 pub const PATH_COLOURS: [&str; 3] = ["#2a6fb0", "#b98a3a", "#c0392b"];
-/// The colours of their discs.
+/// The colours of the discs of first mallet, second mallet and puck.
 pub const DISC_COLOURS: [&str; 3] = ["#7fb2e0", "#e8c27c", "#e06a5c"];
 /// The colours of the table: its surface and edge, the middle line, the goals, and a target zone.
 pub const TABLE_COLOURS: [&str; 5] = ["#fbfbf8", "#333", "#bbb", "#c33", "#dff0dc"];

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 /// Seconds between two frames.
 const FRAME_TIME_S: f64 = FRAME_TIME_CS as f64 / 100.0;
-/// Frames of the last moment, which stays for a second.
+/// Number of times that the last frame is written, so that the end stays for a second.
 const FINAL_FRAMES: usize = 25;
 /// Largest number of frames of each format, without the copies of the last frame. A GIF of one minute has some megabytes, and
 /// most programs show longer GIFs badly. The limit of MPEG-4 suffices for a game of 15 minutes.
@@ -122,9 +122,14 @@ impl VideoOptions {
 }
 
 impl Video {
-    /// Writes the video of a scene. `span`: its first and last sample, unless the options have others.
-    pub fn write(&self, scene: &Scene, span: [usize; 2], file: &Path) -> anyhow::Result<()> {
-        let frames = self.frames(scene, span)?;
+    /// Writes the video of a scene. `default_span` is the first and the last sample without `--from` and `--to`.
+    pub fn write(
+        &self,
+        scene: &Scene,
+        default_span: [usize; 2],
+        file: &Path,
+    ) -> anyhow::Result<()> {
+        let frames = self.frames(scene, default_span)?;
         let backdrop = scene.backdrop()?;
         let mut encoder = match self.format {
             VideoFormat::Gif => Encoder::gif(file, backdrop.size())?,
@@ -151,11 +156,11 @@ impl Video {
     }
 
     /// The sample of each frame.
-    fn frames(&self, scene: &Scene, span: [usize; 2]) -> anyhow::Result<Vec<usize>> {
+    fn frames(&self, scene: &Scene, default_span: [usize; 2]) -> anyhow::Result<Vec<usize>> {
         let [_, end] = scene.whole();
         let sample = |seconds: f64| (seconds / CONTROL_STEP_S).round() as usize;
-        let from = self.from_s.map_or(span[0], sample);
-        let to = self.to_s.map_or(span[1], sample).min(end);
+        let from = self.from_s.map_or(default_span[0], sample);
+        let to = self.to_s.map_or(default_span[1], sample).min(end);
         let seconds = |sample: usize| sample as f64 * CONTROL_STEP_S;
         if from > end {
             bail!(

@@ -16,7 +16,7 @@ use std::{
 
 #[derive(Debug, Clone, Default, Args)]
 pub struct TournamentArgs {
-    /// A team that withdrew, and the first round whose games do not count: the running round, or the next
+    /// A team that withdrew, and the first round whose games do not count, such as Alpha=3
     #[arg(long, value_name = "TEAM=ROUND")]
     withdrawn: Vec<TeamAndRound>,
     /// A disqualified team, and the first round whose games do not count; the team is ranked below all others

@@ -1,7 +1,9 @@
-//! The server's clock: it follows the system clock as long as Linux' monotonic clock explains its time.
+//! The server's clock. It follows the system clock as long as that advances like Linux' monotonic clock, which cannot be set. If the
+//! system clock is set (a *step*), the server's time continues by the monotonic clock. This lasts until the system clock is right again
+//! or an organiser accepts the step.
 //!
-//! A file in the data folder records when the monotonic clock was zero. So a restart of the server, without one of the
-//! machine, is no occasion to set the clock unnoticed.
+//! A file in the data folder records the time at which the monotonic clock was zero. So the server also
+//! notices a step that happened while it did not run, unless the machine was restarted.
 
 use anyhow::Context;
 use faceoff_store::Store;
@@ -29,11 +31,12 @@ const FILE: &str = "clock.json";
 struct ClockRecord {
     /// Linux' id of this start of the machine.
     boot_id: String,
-    /// The time at the zero of the monotonic clock, by the server's time.
+    /// The server's time at the zero of the monotonic clock.
     zero_at: Timestamp,
 }
 
-/// The clock of a server with this data folder.
+/// The clock of a server with this data folder. It is also compared with the time of the newest event in the database: a clock that
+/// is behind that is wrong.
 ///
 /// # Errors
 /// If the database cannot be read.

@@ -149,7 +149,7 @@ fn is_alive(id: i32) -> bool {
     Pid::from_raw(id).is_some_and(|id| test_kill_process(id) != Err(Errno::SRCH))
 }
 
-/// Creates an empty private folder, or removes everything in it but the entry `kept`.
+/// Creates an empty private folder, or removes everything in an existing one but the entry named `kept`.
 ///
 /// # Errors
 /// If the folder cannot be emptied or created.

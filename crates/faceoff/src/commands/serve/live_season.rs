@@ -26,7 +26,7 @@ use std::sync::Arc;
 use std::thread;
 use tokio_util::sync::CancellationToken;
 
-/// What the slots run on, and what agents run in.
+/// The CPUs and threads of the slots, and the runtimes and limits that the pages show to teams.
 struct SlotResources {
     cpus: CpuLayout,
     threads: SlotThreads,
@@ -53,7 +53,8 @@ pub(super) fn run(config: Config, connections: ConnectionLimits) -> anyhow::Resu
             runtime.block_on(serve(config, connections, slots))
         })
         .context("starting the service thread")?;
-    // The threads of the slots are started on this thread, because they inherit its CPUs and its priority.
+    // The service thread runs requests, database and schedule. The threads of the slots are started on this thread, because they
+    // inherit its CPUs and its priority.
     starter.run();
     service
         .join()
@@ -96,7 +97,7 @@ async fn serve(
     };
     let router = faceoff_http::router(store.clone(), live.clone(), http_config.clone());
     let deliverer = webhook_deliverer(&config, &store, &clock)?;
-    // The runtimes' files in memory, kept as long as agents run.
+    // The copy of the runtimes' files in memory lasts as long as this value, so as long as agents run.
     let _memory_copy = copy_to_memory(&mut agent.runtimes, config.sandbox.resident_bytes);
     let workers = WorkerConfig {
         slots: SlotsConfig {
@@ -106,6 +107,7 @@ async fn serve(
             agent,
             metrics: metrics.clone(),
         },
+        // With `play = false`, only remote workers run evaluations and games.
         job_filter: match config.workers.play {
             true => JobFilter::All,
             false => JobFilter::ValidationAndScoring,

@@ -34,7 +34,7 @@ pub async fn serve_metrics(
     Ok(())
 }
 
-/// Counts the recorded changes of the season as metrics, until `shutdown`.
+/// Counts the season's changes by kind, as metrics, until `shutdown`. Changes are the events of the database's log.
 pub async fn count_changes(
     store: Store,
     metrics: Metrics,
@@ -48,6 +48,7 @@ pub async fn count_changes(
         };
         match change {
             Ok(Change::Recorded(record)) => metrics.record_event(&record.event.kind()),
+            // Progress within a job is not in the log.
             Ok(Change::Progress(_)) => {}
             Err(RecvError::Lagged(missed)) => metrics.record_missed_events(missed),
             Err(RecvError::Closed) => return Ok(()),

@@ -39,8 +39,10 @@ pub(super) fn remote_config(
         files_url: files_url.unwrap_or_else(|| format!("http://{address}")),
         key: link_key.grant_key(),
         bucket,
+        // Counts the checks of results that did not end, for example because they ended the server.
         checks_dir: config.server.data_dir.join("result-checks"),
         checked_episodes: config.workers.checked_episodes,
+        // A worker gets jobs only if it can do what this server offers to agents.
         required: own_capabilities(agent, config.slots())?,
     }))
 }

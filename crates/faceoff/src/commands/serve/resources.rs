@@ -32,11 +32,13 @@ pub(super) struct ServerResources {
     pub(super) store: Store,
     pub(super) listener: TcpListener,
     pub(super) address: SocketAddr,
+    /// Signs download links and the grants of remote workers.
     pub(super) link_key: LinkKey,
     pub(super) clock: Clock,
     pub(super) upload_dir: PathBuf,
+    /// The files of the page `/downloads`.
     downloads: Arc<Downloads>,
-    /// Held as long as the season is served.
+    /// The lock of the data folder, held as long as the season is served.
     _lock: File,
 }
 
@@ -56,10 +58,11 @@ impl ServerResources {
         let store = open_store(data_dir)
             .await?
             .with_free_space(FreeSpace::new(disks, config.server.min_free_bytes));
-        // Before any change of the database.
+        // Before any change of the database, because the clock is compared with the time of the newest change.
         let clock = server_clock(data_dir, &store).await?;
         // After the database and the folder of artifacts exist.
         close_to_others(data_dir)?;
+        // A data folder belongs to one competition: the first start binds it, later starts compare.
         let checked = competition().check();
         checked.map_err(|problem| anyhow!("the competition of this program: {problem}"))?;
         let bound = store.bind_competition(competition(), clock.now()).await;

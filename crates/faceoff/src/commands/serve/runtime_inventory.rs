@@ -9,7 +9,8 @@ use faceoff_types::{AgentLimits, RuntimeContent};
 use faceoff_worker::CpuLayout;
 use std::thread;
 
-/// The environment of agents on this host. The inventory is taken on a thread with the caller's priority, because all
+/// The limits, machine and runtimes that the pages show for agents on this host. The inventory of runtimes is published to the
+/// result later. It is taken on a thread with the caller's priority, because all
 /// later agent processes inherit the priority of the first one.
 ///
 /// # Errors

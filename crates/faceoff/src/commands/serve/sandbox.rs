@@ -5,17 +5,17 @@ use faceoff_sandbox::{Layer, LayerProbe, MemoryImage, Runtime};
 use std::collections::BTreeMap;
 
 /// Refuses a host that lacks a *layer* (one protection) of the sandbox which the configuration does not give up.
-pub fn check_sandbox(features: &[LayerProbe], given_up: &[Layer]) -> anyhow::Result<()> {
+pub fn check_sandbox(probes: &[LayerProbe], given_up: &[Layer]) -> anyhow::Result<()> {
     let mut missing = Vec::new();
-    for feature in features.iter().filter(|feature| !feature.available) {
-        if given_up.contains(&feature.layer) {
-            tracing::warn!(layer = ?feature.layer, found = feature.found, "sandbox layer given up by configuration");
+    for probe in probes.iter().filter(|probe| !probe.available) {
+        if given_up.contains(&probe.layer) {
+            tracing::warn!(layer = ?probe.layer, found = probe.found, "sandbox layer given up by configuration");
         } else {
-            let fix = feature.fix.as_deref().unwrap_or("not known for this host");
+            let fix = probe.fix.as_deref().unwrap_or("not known for this host");
             missing.push(format!(
                 "{}: {}\n    fix: {fix}",
-                layer_name(feature.layer),
-                feature.found
+                layer_name(probe.layer),
+                probe.found
             ));
         }
     }

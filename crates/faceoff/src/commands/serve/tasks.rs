@@ -1,4 +1,4 @@
-//! The tasks of a server, all of which run until the shutdown.
+//! The async tasks of a server, such as HTTP, slots and schedule, all of which run until the shutdown.
 
 use super::http::shutdown_signal;
 use anyhow::{Context, bail};

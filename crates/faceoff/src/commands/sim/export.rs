@@ -9,7 +9,7 @@ use std::{io::Write as _, path::PathBuf};
 /// Writes the ideal model of robot, table and puck for other programs.
 #[derive(Debug, Args)]
 pub struct ExportArgs {
-    /// urdf: the arm. mjcf: arm, table and puck. python: a module of the numbers. svg: a drawing.
+    /// urdf: the arm. mjcf: arm, table and puck. python: a module with the model's numbers. svg: a drawing.
     #[arg(long)]
     format: Format,
     /// plant: the simulated robot, with universal joint and mallet. controller: seven joints, no mallet.

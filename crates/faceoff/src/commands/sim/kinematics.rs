@@ -165,6 +165,7 @@ fn evaluate(q: &[f64; DOFS], dq: &[f64; DOFS]) -> PoseModel {
         // The torques of a unit acceleration minus gravity are one column.
         let mut unit = zero;
         unit[joint] = 1.0;
+        // Without motion, so that no other torques contribute.
         let column = torques(&zero, &unit);
         for row in 0..JOINTS {
             mass[row][joint] = column[row] - gravity[row];

@@ -25,6 +25,7 @@ struct RawScenario {
     task: Option<AirHockeyTask>,
     profile: Option<AirHockeyProfile>,
     seed: Option<Value>,
+    /// Number of robots.
     robots: Option<u32>,
     puck: Vec<f64>,
     joints: Option<Vec<Vec<f64>>>,
@@ -51,7 +52,7 @@ pub struct Scenario {
     pub interpolation: Vec<Interpolation>,
     /// Actions by robot and control step, row-major.
     pub actions: Vec<Vec<Vec<f64>>>,
-    /// Prescribed states of a mallet, one per ms, instead of that of robot 1.
+    /// Prescribed states of the first robot's mallet, one per ms; its arm then stays where it is.
     pub mallet: Vec<MalletState>,
     /// Duration of the scenario, ms.
     pub duration_ms: u64,
@@ -193,7 +194,7 @@ fn parse_actions(
             let shape = interpolation[robot].shape();
             let len = interpolation[robot].len();
             let mut flat = Vec::with_capacity(len);
-            // The recordings of REFERENCE.md concatenate the rows of an action.
+            // The recordings of the reference simulator (`tests/reference`) concatenate the rows of an action.
             let input_shape = match action {
                 Value::Array(items) if items.len() == len => &[len][..],
                 _ => shape,
@@ -273,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn minimal_scenario_holds_one_robot() {
+    fn minimal_scenario_has_one_robot_in_the_initial_pose() {
         let scenario =
             Scenario::read(r#"{"puck": [0, 0, 0, 1, 0, 0], "duration_ms": 10}"#.as_bytes())
                 .unwrap();

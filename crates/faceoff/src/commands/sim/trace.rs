@@ -28,9 +28,9 @@ struct Line {
     universal: Vec<[f64; 2]>,
     /// Joint torques, N m.
     torque: Vec<[f64; JOINTS]>,
-    /// Position of the end effector.
+    /// Position of the end effector, m.
     ee: Vec<[f64; 3]>,
-    /// x, y, z, vx, vy.
+    /// x, y, z, vx, vy of each mallet.
     mallet: Vec<[f64; 5]>,
     constraints: Vec<Constraints>,
 }
@@ -122,7 +122,7 @@ fn trace(scenario: &Scenario, out: &mut impl Write) -> Result<()> {
 
 /// Sets the mallet to the scenario's state for this millisecond; after the last one, it stays there at rest.
 fn impose_mallet(world: &mut World, scenario: &Scenario, t_ms: u64) {
-    let row = usize::try_from(t_ms)
+    let prescribed = usize::try_from(t_ms)
         .ok()
         .and_then(|t| scenario.mallet.get(t))
         .copied();
@@ -132,7 +132,7 @@ fn impose_mallet(world: &mut World, scenario: &Scenario, t_ms: u64) {
             ..*last
         })
     };
-    if let Some(mallet) = row.or_else(at_rest) {
+    if let Some(mallet) = prescribed.or_else(at_rest) {
         world.impose_mallet(Some(mallet));
     }
 }

@@ -1,4 +1,4 @@
-//! Text of games.
+//! Text of games. A *matchday* is a part of a round in which no team has two pairings.
 
 use crate::commands::output::{exact_time_text, lines_or};
 use faceoff_api::views::{
@@ -44,7 +44,7 @@ pub(in crate::commands) fn games_table(games: &[GameView]) -> String {
 /// Headings of the columns that [`state_text`] prints for a game with a result.
 const COLUMNS: &str = "  score    goals    fouls   penalty points  winner and reason";
 
-/// Position of a game in the schedule, or its purpose.
+/// Round and matchday of a scheduled game, or the purpose of another one.
 fn purpose_text(purpose: &PurposeView) -> String {
     match purpose {
         PurposeView::Round {
@@ -95,6 +95,7 @@ pub(in crate::commands) fn game_text(game: &GameView) -> String {
         PurposeView::Round {
             round,
             matchday,
+            // The number of the pairing of the two teams in the round's draw.
             meeting,
             second_half,
         } => {

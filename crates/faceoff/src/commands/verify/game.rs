@@ -30,8 +30,8 @@ pub(super) struct SimulatedGame {
 /// archive.
 pub(super) fn verify(path: &Path, blake3: Option<&blake3::Hash>) -> Result<SimulatedGame, Failure> {
     let recording = GameRecording::open(path)?;
-    let archive = recording.archive()?.map(|digest| digest.blake3);
-    check_hash(blake3, archive.as_deref())?;
+    let archive_hash = recording.archive()?.map(|digest| digest.blake3);
+    check_hash(blake3, archive_hash.as_deref())?;
     let bar = ProgressBar::new(u64::from(recording.manifest().spec.steps)).with_style(
         ProgressStyle::with_template("{bar:40} {pos}/{len} steps, {per_sec}, {eta} left")
             .context("the progress bar's template")
@@ -49,7 +49,7 @@ pub(super) fn verify(path: &Path, blake3: Option<&blake3::Hash>) -> Result<Simul
         rallies,
         steps,
         seconds: start.elapsed().as_secs_f64(),
-        blake3: archive,
+        blake3: archive_hash,
         result: score,
     })
 }
@@ -86,7 +86,7 @@ pub(super) fn describe(path: &Path, simulated: &SimulatedGame) -> String {
     )
 }
 
-/// Refuses `--secret` for a game.
+/// Refuses `--secret` for a game, whose seed is not checked against the season's secret.
 pub(super) fn refuse_secret(has_secret: bool) -> Result<(), Failure> {
     if has_secret {
         return Err(Failure::from(DatasetError::Foreign(

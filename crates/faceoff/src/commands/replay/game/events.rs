@@ -10,7 +10,7 @@ use serde::Serialize;
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GameEvent {
     pub time_s: f64,
-    /// Control steps of the game before it.
+    /// Control steps of the game before the event.
     pub game_step: u32,
     /// `goal`, `foul`, `stuck`, `left_table`, `diverged`, `game_over`, `fault` or `forfeit`.
     pub event: String,
@@ -89,7 +89,7 @@ fn faults(game: &RecordedGame) -> Vec<GameEvent> {
     events
 }
 
-/// The end of a rally. `fouls` are the fouls so far.
+/// The event of a rally's end. `fouls` are the fouls of each side so far; a foul is added.
 fn rally_end(game: &RecordedGame, rally: &ListedRally, fouls: &mut [u32; 2]) -> GameEvent {
     let [first, second] = rally.score;
     let text = match (rally.end.as_str(), rally.by) {

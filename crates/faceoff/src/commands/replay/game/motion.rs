@@ -4,17 +4,18 @@ use super::recording::RecordedGame;
 use faceoff_types::CONTROL_STEP_S;
 use serde_json::{Value, json};
 
-/// Positions are rounded to a millimetre, half a pixel of the picture.
-const PER_METRE: f64 = 1e3;
+/// Positions are rounded to whole millimetres, of which two are a pixel of the picture.
+const MM_PER_M: f64 = 1e3;
 
 /// The positions (mm) as differences between consecutive samples, which have few digits; for each rally, its first and last sample
 /// and the score before it; and for each side, the spans of samples with a violation, each as first and last sample.
 pub fn json(game: &RecordedGame) -> Value {
+    // A column of differences; the first entry is the difference from 0.
     let column = |value: &dyn Fn(usize) -> f64| -> Vec<i64> {
         let mut previous = 0;
         (0..game.samples.len())
             .map(|sample| {
-                let rounded = (value(sample) * PER_METRE).round() as i64;
+                let rounded = (value(sample) * MM_PER_M).round() as i64;
                 rounded - std::mem::replace(&mut previous, rounded)
             })
             .collect()

@@ -27,17 +27,19 @@ struct Page<'a> {
     sides: [SideRow<'a>; 2],
     competition: &'a Competition,
     duration: String,
+    /// The picture of the table, as SVG.
     table: String,
     /// The rally that is shown without JavaScript.
     shown_rally: String,
     /// The texts of the rallies, and the first sample of each.
     rallies: Vec<(String, u32)>,
-    events: Vec<Row<'a>>,
+    events: Vec<EventRow<'a>>,
     penalties: Vec<PenaltyRow<'a>>,
     /// Index of the last sample.
     last: usize,
     /// The sample that the page shows first.
     start: u32,
+    /// What the script animates, as JSON ([`motion::json`]).
     motion: String,
 }
 
@@ -49,18 +51,19 @@ struct SideRow<'a> {
 }
 
 /// An event in the list and on the timeline.
-struct Row<'a> {
+struct EventRow<'a> {
     event: &'a GameEvent,
     clock: String,
-    /// Where the link jumps to, s.
+    /// The time to which the event's link jumps, a little before the event, s.
     from_s: String,
-    /// Position on the timeline, of 1000.
+    /// Horizontal position on the timeline, which is 1000 units wide.
     x: f64,
 }
 
 struct PenaltyRow<'a> {
     penalty: &'a Penalty,
     clock: String,
+    /// As in [`EventRow`].
     from_s: String,
 }
 
@@ -91,7 +94,7 @@ pub fn html(game: &RecordedGame, chosen: Option<&ListedRally>) -> anyhow::Result
             .collect(),
         events: events
             .iter()
-            .map(|event| Row {
+            .map(|event| EventRow {
                 event,
                 clock: clock::text(event.game_step),
                 from_s: from_s(event.game_step),
@@ -113,7 +116,8 @@ pub fn html(game: &RecordedGame, chosen: Option<&ListedRally>) -> anyhow::Result
     Ok(page.render()?)
 }
 
-/// The first sample of a rally. The one at its start is the last of the rally before.
+/// The first sample that shows a rally, one control step after its serve. The sample at the serve still shows the end of the rally
+/// before, unless the rally is the first.
 pub fn first_sample(rally: &ListedRally) -> u32 {
     match rally.game_step {
         0 => 0,

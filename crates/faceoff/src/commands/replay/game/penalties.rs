@@ -1,4 +1,4 @@
-//! The causes of penalty points in a game. It is divided into windows of 500 control steps, in each of which a cause counts once.
+//! The causes of penalty points in a game. A game is divided into windows of 500 control steps, in each of which a cause counts once.
 
 use super::{super::recording::CONSTRAINTS, clock, recording::RecordedGame};
 use faceoff_airhockey::{EE, JOINT_POS, JOINT_VEL, LINK};
@@ -15,13 +15,13 @@ pub struct Penalty {
     pub time_s: f64,
     /// Control steps of the game before the first violation, or before the window of the computation time.
     pub game_step: u32,
-    /// 1 or 2.
+    /// Number of the penalised side, 1 or 2.
     pub side: u32,
     pub points: f64,
     pub text: String,
 }
 
-/// The causes in the order of time, of the sides that the recording shows.
+/// The penalties in the order of time. A side's own archive does not show those of the other side.
 pub fn list(game: &RecordedGame) -> Vec<Penalty> {
     let mut penalties = Vec::new();
     for (side, course) in Side::BOTH.into_iter().zip(&game.course.sides) {
@@ -48,7 +48,7 @@ pub fn list(game: &RecordedGame) -> Vec<Penalty> {
 fn violations(course: &SideCourse, start: u32) -> impl Iterator<Item = (u32, f64, String)> {
     // Sample k is the state after k control steps, so the window's samples begin at 1.
     let samples = start + 1..=start + WINDOW_STEPS;
-    NAMES
+    VIOLATION_NAMES
         .into_iter()
         .zip(CONSTRAINTS)
         .filter_map(move |(name, (title, points, unit))| {
@@ -93,11 +93,11 @@ fn window_text(start: u32) -> String {
     format!("{} to {}", minutes(start), minutes(start + WINDOW_STEPS))
 }
 
-/// The names of [`CONSTRAINTS`], in their order.
-const NAMES: [ViolationName; 4] = [JOINT_POS, JOINT_VEL, EE, LINK];
+/// The violations of [`CONSTRAINTS`], in their order.
+const VIOLATION_NAMES: [ViolationName; 4] = [JOINT_POS, JOINT_VEL, EE, LINK];
 
-/// The points of a window for agent faults or for computation time. A window with an agent fault gets no points for computation
-/// time.
+/// The points of a window for agent faults or for computation time, with control step and cause. Agent faults cost as much as the
+/// worst computation times, so a window with an agent fault gets no points for computation time.
 fn time_or_fault(course: &SideCourse, window: usize, start: u32) -> Option<(u32, f64, String)> {
     let window_outcome = &course.outcome.windows[window];
     if window_outcome.faults > 0 {

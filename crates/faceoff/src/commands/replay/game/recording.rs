@@ -11,6 +11,7 @@ const INITIAL_MALLETS: [[f64; 2]; 2] = [[-0.8, 0.0], [0.8, 0.0]];
 
 /// A recorded game.
 pub struct RecordedGame {
+    /// Score, rallies, violations and faults.
     pub course: GameCourse,
     /// The displayed names of the sides: their agents' names, followed by the side's number if both names are equal.
     pub agents: [String; 2],

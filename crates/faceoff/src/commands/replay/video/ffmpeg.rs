@@ -21,7 +21,7 @@ use std::{
 const TIMEOUT: Duration = Duration::from_secs(120);
 /// Longest wait for ffmpeg's error output after ffmpeg has ended: a child process of ffmpeg may still hold the pipe open.
 const MESSAGE_TIMEOUT: Duration = Duration::from_secs(10);
-/// Its errors are read to their end, and this much of them is stored.
+/// The error output of ffmpeg is read to its end, and this much of the end is stored.
 const MAX_MESSAGE_BYTES: usize = 4096;
 /// Time between two looks at whether it has ended.
 const POLL_INTERVAL: Duration = Duration::from_millis(10);
@@ -29,7 +29,7 @@ const POLL_INTERVAL: Duration = Duration::from_millis(10);
 /// A process of ffmpeg. Unless it has ended, it is killed.
 pub struct Ffmpeg {
     process: Child,
-    /// The last line of its errors.
+    /// Receives the last line of ffmpeg's error output.
     message: Receiver<String>,
     timeout: Duration,
 }
@@ -168,7 +168,7 @@ fn last_line(errors: Option<ChildStderr>) -> Receiver<String> {
         }
         let text = String::from_utf8_lossy(&tail);
         let line = text.trim_end().lines().next_back().unwrap_or_default();
-        // Fails if ffmpeg has succeeded: its message is not asked for.
+        // Fails if ffmpeg has succeeded, because then no one receives the message.
         let _ = sender.send(line.to_owned());
     });
     receiver

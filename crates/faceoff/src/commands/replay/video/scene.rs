@@ -67,7 +67,7 @@ impl Scene {
         [0, self.samples.len().saturating_sub(1)]
     }
 
-    /// What all frames have in common.
+    /// The picture that all frames have in common: the table without bodies and texts.
     pub fn backdrop(&self) -> Result<Picture, PictureError> {
         // Encoders of videos take even heights only.
         let height = (f64::from(CAPTION_PX) + height_px(WIDTH_PX)) as u32;
@@ -83,6 +83,7 @@ impl Scene {
         let mut frame = backdrop.clone();
         let [width, height] = frame.size();
         let mut drawing = Drawing::transparent(width, height);
+        // Vertical position of the text's base line.
         let baseline = f64::from(CAPTION_PX) - 22.0;
         let time = (self.clock)(sample);
         let right = f64::from(WIDTH_PX) - MARGIN_PX;

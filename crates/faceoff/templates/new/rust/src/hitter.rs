@@ -56,7 +56,7 @@ impl Policy {
     /// One step of a shot, or a braking step once it has ended.
     fn shoot(&mut self, Shot { dx, dy, steps_left }: Shot) -> Action {
         let (mallet, puck) = (&mut self.mallet, self.puck.state);
-        // Distance of the puck in the shot's direction.
+        // Distance from mallet to puck in the shot's direction; negative once the puck is behind the mallet.
         let ahead = (puck.x - mallet.x) * dx + (puck.y - mallet.y) * dy;
         if steps_left == 0 || ahead < 0.0 {
             return mallet.move_at_velocity(0.0, 0.0);

@@ -30,12 +30,14 @@ pub struct Mallet {
     height: f64,
     /// x of our goal line, m.
     pub goal: f64,
+    /// The mallet's area: smallest x and largest |y|, m.
     x_min: f64,
     y_max: f64,
     /// Largest used joint speeds, rad/s.
     max_speeds: [f64; 7],
     /// Joint positions, rad.
     q: [f64; 7],
+    /// Position (m) and velocity (m/s).
     pub x: f64,
     pub y: f64,
     pub vx: f64,
@@ -89,6 +91,7 @@ impl Mallet {
     /// One step at a desired velocity (m/s), as far as acceleration and joints allow.
     pub fn move_at_velocity(&mut self, vx: f64, vy: f64) -> Action {
         let change = (vx - self.vx).hypot(vy - self.vy);
+        // The part of the change that the acceleration allows in one step.
         let share = (ACCELERATION * self.dt / change.max(1e-9)).min(1.0);
         let (mut vx, mut vy) = (
             self.vx + share * (vx - self.vx),
@@ -106,17 +109,19 @@ impl Mallet {
             // The joint speeds at the end of the step, from the joint positions one millisecond later.
             let next = inverse(x + 0.001 * vx, y + 0.001 * vy, self.height);
             let speeds: [f64; 7] = std::array::from_fn(|i| (next[i] - q[i]) / 0.001);
-            let load = (0..7).fold(0.0_f64, |load, i| {
+            // The largest joint speed of the step, as a fraction of its limit.
+            let max_share = (0..7).fold(0.0_f64, |max_share, i| {
                 let mean_speed = (q[i] - self.q[i]) / self.dt;
-                load.max(speeds[i].abs().max(mean_speed.abs()) / self.max_speeds[i])
+                max_share.max(speeds[i].abs().max(mean_speed.abs()) / self.max_speeds[i])
             });
-            if load <= 1.0 {
+            if max_share <= 1.0 {
                 (self.q, self.x, self.y, self.vx, self.vy) = (q, x, y, vx, vy);
                 return Action::PositionVelocity([q, speeds]);
             }
             // A joint would be too fast: try a slower motion.
-            (vx, vy) = (vx / load.max(1.2), vy / load.max(1.2));
+            (vx, vy) = (vx / max_share.max(1.2), vy / max_share.max(1.2));
         }
+        // No slower motion is allowed either: stop.
         (self.vx, self.vy) = (0.0, 0.0);
         Action::PositionVelocity([self.q, [0.0; 7]])
     }
@@ -129,7 +134,7 @@ pub fn inverse(x: f64, y: f64, z: f64) -> [f64; 7] {
     let hand = 2.618 - 0.85 * (reach - 0.65);
     let forward = reach - HAND * hand.sin();
     let up = z - HAND * hand.cos() - SHOULDER;
-    // Shoulder, elbow and wrist form a triangle with known sides.
+    // Shoulder, elbow and wrist form a triangle. `side` is its side from shoulder to wrist, opposite the elbow.
     let side = forward.hypot(up).clamp(0.05, 0.999 * (UPPER_ARM + FOREARM));
     let elbow = corner(side, UPPER_ARM, FOREARM);
     let upper = forward.atan2(up) - corner(FOREARM, UPPER_ARM, side);

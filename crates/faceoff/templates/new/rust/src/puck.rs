@@ -51,7 +51,7 @@ impl Puck {
     }
 
     /// Updates the estimate with an observation.
-    pub fn observe(&mut self, [x, y, _, vx, vy, _]: [f64; 6]) {
+    pub fn observe(&mut self, [x, y, _yaw, vx, vy, _yaw_rate]: [f64; 6]) {
         let expected = self.predict(self.dt);
         self.state = if self.last_observed.is_none() {
             Motion { x, y, vx, vy }

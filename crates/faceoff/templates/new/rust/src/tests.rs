@@ -92,7 +92,8 @@ fn agent_keeps_its_limits() {
                 "joint {joint}"
             );
         }
-        // The whole mallet stays on its own side of the table: the base is 1.51 m from the centre of the table.
+        // The whole mallet stays on the table. The base is 1.51 m from the table's centre, so in its frame the table begins at
+        // x = 1.51 - 0.974. The table's half width is 0.519, the mallet's radius 0.04815.
         let [x, y] = forward(&pose);
         assert!(
             x > 1.51 - 0.974 + 0.04815 && y.abs() < 0.519 - 0.04815,

@@ -13,12 +13,12 @@ use syn::{
     visit::{self, Visit},
 };
 
-/// Names of tasks, bodies and events of air hockey, which the platform must not know. The plural is meant, too.
+/// Names of tasks, bodies and events of air hockey, which the platform must not know, neither in the singular nor in the plural.
 const WORDS: [&str; 8] = [
     "hit", "defend", "prepare", "puck", "mallet", "joint", "goal", "foul",
 ];
 
-/// The crates of a row of the table "The line".
+/// The crates on one side of the line: a row of the first table in the section "The line".
 pub fn crates_on_side(row: &str) -> BTreeSet<String> {
     let text = fs::read_to_string(repository().join("ARCHITECTURE.md"))
         .expect("ARCHITECTURE.md can be read");
@@ -73,7 +73,7 @@ pub struct Finding {
 }
 
 impl Finding {
-    /// Is it in the module with this path, or in a module of it?
+    /// Is the finding in the module with this path, or in a module of it?
     pub fn is_in(&self, module: &str) -> bool {
         let path = self.file.trim_end_matches(".rs");
         path.strip_prefix(module)
@@ -124,7 +124,7 @@ pub fn findings(folder: &Path, air_hockey: &BTreeSet<String>) -> Vec<Finding> {
     found
 }
 
-/// The files of modules of this file that only tests have.
+/// The files of the modules that this file declares for tests only.
 fn test_modules((path, syntax): &(PathBuf, syn::File)) -> Vec<PathBuf> {
     let stem = path.file_stem().unwrap_or_default();
     let is_root = ["lib", "main", "mod"].iter().any(|root| stem == *root);
