@@ -135,7 +135,9 @@ fn compare_with_alone(simd_level: SimdLevel, plays: Vec<EpisodeWithAgent>) -> Ve
             .map(|(play, _)| &mut play.episode)
             .collect();
         step_episodes_on(simd_level, &mut episodes, &actions, &mut at_once);
-        for ((grouped, single), (grouped_outcome, single_outcome)) in pairs.iter().zip(at_once.iter().zip(&alone)) {
+        for ((grouped, single), (grouped_outcome, single_outcome)) in
+            pairs.iter().zip(at_once.iter().zip(&alone))
+        {
             let label = format!(
                 "{simd_level:?}, {:?}, step {}",
                 grouped.habit,

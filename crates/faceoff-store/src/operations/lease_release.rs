@@ -6,8 +6,8 @@ use crate::{
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
-        completion::{self, RunEnd},
-        purpose::{self, Purpose},
+        job_purpose::{self, Purpose},
+        run_completion::{self, RunEnd},
         runs,
         tournament::game_lifecycle,
     },
@@ -43,7 +43,7 @@ pub(crate) async fn event_subject(
 /// Drops a job after platform faults, and ends the submission, run or game that it belongs to.
 pub(crate) async fn give_up(tx: &mut Tx, job: Uuid, stored_kind: &str, reason: &str) -> Result<()> {
     queue::drop_jobs(tx, &[job]).await?;
-    match purpose::of_job(tx, job, stored_kind).await {
+    match job_purpose::of_job(tx, job, stored_kind).await {
         Ok(Purpose::Validation(id)) => {
             submissions::set_validation_error(tx, id, reason).await?;
             let reason = reason.to_owned();
@@ -56,10 +56,10 @@ pub(crate) async fn give_up(tx: &mut Tx, job: Uuid, stored_kind: &str, reason: &
         Ok(Purpose::Game(id)) => game_lifecycle::give_up(tx, id, reason).await,
         Ok(Purpose::Shard { run, .. }) => {
             let owner = runs::find_owner(tx, run).await?;
-            completion::end_run(tx, run, owner, RunEnd::PlatformFailed(reason)).await
+            run_completion::end_run(tx, run, owner, RunEnd::PlatformFailed(reason)).await
         }
         Ok(Purpose::Scoring(evaluation)) => {
-            completion::fail_evaluation(tx, evaluation.id, Failure::Platform(reason)).await
+            run_completion::fail_evaluation(tx, evaluation.id, Failure::Platform(reason)).await
         }
         // No row refers to the job, so there is nothing to end.
         Err(StoreError::Damaged(_)) => Ok(()),
@@ -76,7 +76,7 @@ async fn requeue_leased(
     out_of_space: bool,
 ) -> Result<()> {
     queue::release(tx, claim, delay_s, out_of_space).await?;
-    let purpose = purpose::of_job(tx, claim.job, kind).await?;
+    let purpose = job_purpose::of_job(tx, claim.job, kind).await?;
     if let Purpose::Game(id) = purpose {
         game_lifecycle::end_attempt(tx, id, AttemptOutcome::Released, None).await?;
     }
@@ -114,7 +114,7 @@ impl Store {
             let ClaimState::Leased { kind } = queue::claim_state(tx, claim).await? else {
                 return Ok(());
             };
-            let purpose = purpose::of_job(tx, claim.job, &kind).await?;
+            let purpose = job_purpose::of_job(tx, claim.job, &kind).await?;
             let failures = queue::requeue_failed(tx, claim, now).await?;
             let event = Event::JobFailed {
                 job: claim.job,

@@ -3,7 +3,7 @@
 use crate::{
     error::Result,
     event::{Event, Subject},
-    operations::{purpose, runs},
+    operations::{job_purpose, runs},
     queue::NewJob,
     tables::{
         days,
@@ -58,7 +58,7 @@ pub(crate) async fn queue_evaluation(
     let job = NewJob {
         delay_s,
         batch: queued_as_of.as_millisecond(),
-        ..purpose::SHARD
+        ..job_purpose::SHARD
     };
     runs::queue_run(tx, &run, &[requested.submission], job, requested.team).await?;
     let spec = EvaluationSpec {

@@ -5,7 +5,7 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::{completion, organiser_decisions::void, purpose, runs},
+    operations::{job_purpose, organiser_decisions::void, run_completion, runs},
     queries,
     queue::NewJob,
     store::Store,
@@ -56,7 +56,7 @@ async fn add_proposal(tx: &mut Tx, proposal: &Proposal, proposed: Vec<ProposedRu
     proposals::insert(tx, proposal).await?;
     let job = NewJob {
         batch: tx.now.as_millisecond(),
-        ..purpose::PROPOSAL_SHARD
+        ..job_purpose::PROPOSAL_SHARD
     };
     let count = u32::try_from(proposed.len()).unwrap_or(u32::MAX);
     for proposed_run in proposed {
@@ -329,7 +329,7 @@ impl Store {
             for evaluation in queries::proposals::evaluations_of_proposal(tx, id).await? {
                 if !evaluation.state.is_over() {
                     let failure = Failure::Cancelled("the proposal was dropped");
-                    completion::fail_evaluation(tx, evaluation.id, failure).await?;
+                    run_completion::fail_evaluation(tx, evaluation.id, failure).await?;
                 }
             }
             proposals::set_outcome(tx, id, ProposalOutcome::Dropped(now)).await?;

@@ -5,8 +5,8 @@ use crate::{
     error::Result,
     event::{Event, Subject},
     operations::{
-        commit::{CommitOutcome, wrong_job},
-        purpose::Purpose,
+        commit_job::{CommitOutcome, wrong_job},
+        job_purpose::Purpose,
     },
     queue::JobClaim,
     store::Store,

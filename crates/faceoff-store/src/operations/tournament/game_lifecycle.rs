@@ -5,9 +5,9 @@ use crate::{
     error::{Result, StoreError},
     event::{Event, Subject},
     operations::{
-        commit::{CommitOutcome, wrong_job},
+        commit_job::{CommitOutcome, wrong_job},
+        job_purpose::Purpose,
         jobs::{Job, RunSeeds},
-        purpose::Purpose,
     },
     queue::{self, JobClaim, NewJob, SlotTimeAccount},
     store::Store,

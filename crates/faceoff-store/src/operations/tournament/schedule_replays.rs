@@ -5,7 +5,7 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::{purpose, tournament::game_lifecycle},
+    operations::{job_purpose, tournament::game_lifecycle},
     store::Store,
     tables::{
         entrants,
@@ -110,9 +110,9 @@ impl Store {
                     };
                     let account = match account {
                         Some(account) => account,
-                        None => *account.insert(game_lifecycle::open_account(tx, &game, purpose::SCHEDULE_REPLAY_GAME).await?),
+                        None => *account.insert(game_lifecycle::open_account(tx, &game, job_purpose::SCHEDULE_REPLAY_GAME).await?),
                     };
-                    game_lifecycle::enqueue_for(tx, &game, purpose::SCHEDULE_REPLAY_GAME, account).await?;
+                    game_lifecycle::enqueue_for(tx, &game, job_purpose::SCHEDULE_REPLAY_GAME, account).await?;
                     count += 1;
                 }
             }

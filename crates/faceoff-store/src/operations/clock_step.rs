@@ -4,7 +4,7 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::rerun::RERUN_PAUSES_S,
+    operations::rerun_evaluation::RERUN_PAUSES_S,
     queue,
     store::Store,
     tables::deliveries,

@@ -5,10 +5,9 @@ use crate::{
     error::Result,
     event::{Event, Subject},
     operations::{
-        commit::{CommitOutcome, wrong_job},
-        completion,
-        purpose::Purpose,
-        release_day,
+        commit_job::{CommitOutcome, wrong_job},
+        job_purpose::Purpose,
+        release_day, run_completion,
     },
     queue::JobClaim,
     store::Store,
@@ -40,7 +39,7 @@ impl Store {
                     retentions::set_dataset_bytes(tx, id, dataset_bytes).await?;
                 }
                 if let Some(proposal) = proposal {
-                    return completion::record_proposal_end(tx, proposal).await;
+                    return run_completion::record_proposal_end(tx, proposal).await;
                 }
                 let event = Event::EvaluationFinished {
                     score: result.score,

@@ -5,8 +5,8 @@ use crate::{
     error::{Result, StoreError},
     event::{Actor, Event},
     operations::{
-        completion::{self, RunEnd},
-        purpose::{self, Purpose},
+        job_purpose::{self, Purpose},
+        run_completion::{self, RunEnd},
         runs,
     },
     queue::{self, ClaimState, JobClaim},
@@ -53,7 +53,7 @@ impl Store {
                 ClaimState::AlreadyDone => return Ok(CommitOutcome::AlreadyStored),
                 ClaimState::Lost => return Ok(CommitOutcome::LeaseLost),
             };
-            let purpose = purpose::of_job(tx, claim.job, &kind).await?;
+            let purpose = job_purpose::of_job(tx, claim.job, &kind).await?;
             let progress = match &purpose {
                 Purpose::Shard { shard, .. } => shard.episodes(),
                 Purpose::Validation(_) | Purpose::Game(_) | Purpose::Scoring(_) => 0,
@@ -104,9 +104,9 @@ async fn store_shard(tx: &mut Tx, id: RunId, shard: &Shard, commit: &ShardCommit
     );
     let sums = shards::sums(tx, id).await?;
     if commit.stopped_by_faults || sums.agent_faults > i64::from(run.plan.max_faults) {
-        completion::end_run(tx, id, owner, RunEnd::AgentFailed).await
+        run_completion::end_run(tx, id, owner, RunEnd::AgentFailed).await
     } else if sums.open == 0 {
-        completion::end_run(tx, id, owner, RunEnd::Completed).await
+        run_completion::end_run(tx, id, owner, RunEnd::Completed).await
     } else {
         Ok(())
     }

@@ -6,11 +6,10 @@ use crate::{
     error::{Result, StoreError},
     event::{Actor, Subject},
     operations::{
-        completion,
+        job_purpose::{self, JobFilter, Purpose},
         jobs::{ClaimedJob, Job, RunSeeds},
         lease_release::give_up,
-        purpose::{self, JobFilter, Purpose},
-        runs,
+        run_completion, runs,
         tournament::game_lifecycle,
     },
     queue::{self, JobClaim, LeasedJob},
@@ -110,7 +109,7 @@ impl Store {
 /// Reads the rows that a leased job refers to. `None`: the job must not start now.
 async fn describe_job(tx: &mut Tx, leased: &LeasedJob, worker: &str) -> Result<Option<Job>> {
     let retries = leased.attempts.saturating_sub(1);
-    let job = match purpose::of_job(tx, leased.id.0, &leased.kind).await? {
+    let job = match job_purpose::of_job(tx, leased.id.0, &leased.kind).await? {
         Purpose::Game(id) => {
             tx.record_progress(Subject::Game(id));
             return game_lifecycle::begin(tx, id, worker, retries).await;
@@ -149,7 +148,7 @@ async fn describe_job(tx: &mut Tx, leased: &LeasedJob, worker: &str) -> Result<O
             let owner = runs::find_owner(tx, id).await?;
             let (run, seeds) = read_run(tx, id).await?;
             let submission = single_contestant(tx, id).await?;
-            completion::record_run_start(tx, id, owner).await?;
+            run_completion::record_run_start(tx, id, owner).await?;
             tx.record_progress(owner.subject());
             Ok(Job::Shard {
                 owner,

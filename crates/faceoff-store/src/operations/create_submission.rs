@@ -4,7 +4,7 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::purpose,
+    operations::job_purpose,
     queue,
     store::Store,
     tables::{
@@ -98,8 +98,8 @@ impl Store {
             let id = SubmissionId::new();
             submissions::insert(tx, id, team, &bundle, key, now).await?;
             let account =
-                queue::open_account(tx, purpose::VALIDATION.lane, &team.to_string()).await?;
-            let job = queue::insert(tx, purpose::VALIDATION, account).await?;
+                queue::open_account(tx, job_purpose::VALIDATION.lane, &team.to_string()).await?;
+            let job = queue::insert(tx, job_purpose::VALIDATION, account).await?;
             validation_runs::insert(tx, id, job).await?;
             let event = Event::SubmissionUploaded {
                 team,

@@ -4,7 +4,7 @@ use crate::{
     error::{Result, StoreError},
     event::{Event, Subject},
     operations::{
-        purpose, release_day, rerun,
+        job_purpose, release_day, rerun_evaluation,
         runs::{self, RunOwner},
     },
     queue,
@@ -80,9 +80,13 @@ pub(crate) async fn end_run(
 }
 
 async fn queue_scoring(tx: &mut Tx, id: EvaluationId) -> Result<()> {
-    let account =
-        queue::open_account(tx, purpose::SCORING.lane, purpose::PLATFORM_ACCOUNT_OWNER).await?;
-    let job = queue::insert(tx, purpose::SCORING, account).await?;
+    let account = queue::open_account(
+        tx,
+        job_purpose::SCORING.lane,
+        job_purpose::PLATFORM_ACCOUNT_OWNER,
+    )
+    .await?;
+    let job = queue::insert(tx, job_purpose::SCORING, account).await?;
     scorings::insert(tx, id, job).await
 }
 
@@ -116,7 +120,10 @@ pub(crate) async fn fail_evaluation(
     };
     tx.record(Subject::Evaluation(id), event);
     if let Failure::Platform(_) = failure {
-        log_damage(id, rerun::rerun_after_platform_fault(tx, id).await)?;
+        log_damage(
+            id,
+            rerun_evaluation::rerun_after_platform_fault(tx, id).await,
+        )?;
     }
     log_damage(id, release_day::release_if_over(tx, id).await)
 }
