@@ -77,7 +77,7 @@ pub enum StoreError {
     InvitationInvalid(String),
     /// The team has used an idempotency key for another bundle before.
     #[error("the key was used for the submission {submission}, whose bundle is another one")]
-    KeyUsed {
+    IdempotencyKeyUsed {
         /// The earlier submission.
         submission: SubmissionId,
     },

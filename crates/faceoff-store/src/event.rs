@@ -2,12 +2,12 @@
 
 mod actor;
 mod kinds;
-mod parse;
-mod public;
+mod parse_error;
 mod subject;
+mod visibility;
 
 pub use actor::Actor;
-pub use parse::ParseEventError;
+pub use parse_error::ParseEventError;
 pub use subject::Subject;
 
 use faceoff_types::{

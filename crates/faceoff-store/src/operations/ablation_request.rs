@@ -10,7 +10,7 @@ use crate::{
     store::Store,
     tables::{
         ablations::{self, Ablation},
-        plan::RunPlan,
+        run_plan::RunPlan,
         runs::Run,
         season,
         submissions::{self, SubmissionState},

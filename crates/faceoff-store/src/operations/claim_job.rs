@@ -6,7 +6,7 @@ use crate::{
     error::{Result, StoreError},
     event::{Actor, Subject},
     operations::{
-        job_purpose::{self, JobFilter, Purpose},
+        job_purpose::{self, JobFilter, JobPurpose},
         jobs::{ClaimedJob, Job, RunSeeds},
         lease_release::give_up,
         run_completion, runs,
@@ -110,11 +110,11 @@ impl Store {
 async fn describe_job(tx: &mut Tx, leased: &LeasedJob, worker: &str) -> Result<Option<Job>> {
     let retries = leased.attempts.saturating_sub(1);
     let job = match job_purpose::of_job(tx, leased.id.0, &leased.kind).await? {
-        Purpose::Game(id) => {
+        JobPurpose::Game(id) => {
             tx.record_progress(Subject::Game(id));
             return game_lifecycle::begin(tx, id, worker, retries).await;
         }
-        Purpose::Validation(id) => {
+        JobPurpose::Validation(id) => {
             tx.record_progress(Subject::Submission(id));
             let submission = submissions::find(tx, id).await?;
             let secret = season::read(tx).await?.secret;
@@ -144,7 +144,7 @@ async fn describe_job(tx: &mut Tx, leased: &LeasedJob, worker: &str) -> Result<O
                 runtimes,
             })
         }
-        Purpose::Shard { run: id, shard } => {
+        JobPurpose::Shard { run: id, shard } => {
             let owner = runs::find_owner(tx, id).await?;
             let (run, seeds) = read_run(tx, id).await?;
             let submission = single_contestant(tx, id).await?;
@@ -159,7 +159,7 @@ async fn describe_job(tx: &mut Tx, leased: &LeasedJob, worker: &str) -> Result<O
                 platform_retries: retries,
             })
         }
-        Purpose::Scoring(evaluation) => {
+        JobPurpose::Scoring(evaluation) => {
             tx.record_progress(evaluation.owner().subject());
             describe_scoring(tx, evaluation.id, evaluation.run).await
         }

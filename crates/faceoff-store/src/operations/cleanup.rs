@@ -24,7 +24,7 @@ pub const PLATFORM_FAILED_BUNDLES_KEPT_FOR: SignedDuration = SignedDuration::fro
 pub const ENDED_CREDENTIALS_KEPT_FOR: SignedDuration = SignedDuration::from_hours(30 * 24);
 
 /// Number of ended credentials that one transaction deletes. Other changes wait for it only briefly.
-const FORGOTTEN_AT_ONCE: u32 = 500;
+const MAX_DELETED_AT_ONCE: u32 = 500;
 
 /// Number of a team's invalid submissions whose logs are kept, the newest ones. A bundle of a few bytes can have a long log.
 pub const INVALID_LOGS_KEPT: u32 = 50;
@@ -101,7 +101,7 @@ impl Store {
             self.write(Actor::Server, now, async |tx| {
                 bundles::set_failed_removed(tx, *id, now).await?;
                 submissions::share_log(tx, *id).await?;
-                submissions::forget_old_logs(tx, *id, INVALID_LOGS_KEPT).await
+                submissions::empty_old_logs(tx, *id, INVALID_LOGS_KEPT).await
             })
             .await?;
         }
@@ -116,8 +116,9 @@ impl Store {
         let mut total = 0;
         loop {
             let deleted = self.write(Actor::Server, now, async |tx| {
-                let tokens = tokens::forget_ended(tx, ended_before, FORGOTTEN_AT_ONCE).await?;
-                Ok(tokens + invitations::forget_ended(tx, ended_before, FORGOTTEN_AT_ONCE).await?)
+                let tokens = tokens::delete_ended(tx, ended_before, MAX_DELETED_AT_ONCE).await?;
+                Ok(tokens
+                    + invitations::delete_ended(tx, ended_before, MAX_DELETED_AT_ONCE).await?)
             });
             match deleted.await? {
                 0 => return Ok(total),

@@ -5,7 +5,7 @@ use crate::{
     error::{Result, StoreError},
     event::{Actor, Event},
     operations::{
-        job_purpose::{self, Purpose},
+        job_purpose::{self, JobPurpose},
         run_completion::{self, RunEnd},
         runs,
     },
@@ -32,7 +32,7 @@ pub enum CommitOutcome {
 }
 
 /// The error for a claim on one kind of job that is committed as another kind.
-pub(crate) fn wrong_job(expected: &str, purpose: &Purpose) -> StoreError {
+pub(crate) fn wrong_job(expected: &str, purpose: &JobPurpose) -> StoreError {
     StoreError::Conflict(format!(
         "the claim is not on a {expected}, but on {purpose:?}"
     ))
@@ -44,7 +44,7 @@ impl Store {
         &self,
         claim: &JobClaim,
         now: Timestamp,
-        commit: impl AsyncFnOnce(&mut Tx, Purpose) -> Result<()>,
+        commit: impl AsyncFnOnce(&mut Tx, JobPurpose) -> Result<()>,
     ) -> Result<CommitOutcome> {
         let actor = Actor::Worker(claim.holder.clone());
         self.write(actor, now, async |tx| {
@@ -55,8 +55,8 @@ impl Store {
             };
             let purpose = job_purpose::of_job(tx, claim.job, &kind).await?;
             let progress = match &purpose {
-                Purpose::Shard { shard, .. } => shard.episodes(),
-                Purpose::Validation(_) | Purpose::Game(_) | Purpose::Scoring(_) => 0,
+                JobPurpose::Shard { shard, .. } => shard.episodes(),
+                JobPurpose::Validation(_) | JobPurpose::Game(_) | JobPurpose::Scoring(_) => 0,
             };
             queue::mark_done(tx, claim, progress).await?;
             commit(tx, purpose).await?;
@@ -78,7 +78,7 @@ impl Store {
         now: Timestamp,
     ) -> Result<CommitOutcome> {
         self.commit(claim, now, async |tx, purpose| match purpose {
-            Purpose::Shard { run, shard } => store_shard(tx, run, &shard, &commit).await,
+            JobPurpose::Shard { run, shard } => store_shard(tx, run, &shard, &commit).await,
             other => Err(wrong_job("shard", &other)),
         })
         .await

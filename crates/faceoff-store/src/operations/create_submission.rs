@@ -67,7 +67,7 @@ impl Store {
     /// [`StoreError::SeasonClosed`](crate::StoreError::SeasonClosed) once the season is over;
     /// [`DailyQuotaExceeded`](crate::StoreError::DailyQuotaExceeded) or
     /// [`StorageQuotaExceeded`](crate::StoreError::StorageQuotaExceeded) beyond the team's quota;
-    /// [`KeyUsed`](crate::StoreError::KeyUsed) if another bundle was uploaded with the key.
+    /// [`IdempotencyKeyUsed`](crate::StoreError::IdempotencyKeyUsed) if another bundle was uploaded with the key.
     #[boxed]
     pub async fn create_submission_once(
         &self,
@@ -85,7 +85,7 @@ impl Store {
                 if earlier.bundle.blake3 == bundle.blake3 {
                     return Ok(earlier);
                 }
-                return Err(StoreError::KeyUsed {
+                return Err(StoreError::IdempotencyKeyUsed {
                     submission: earlier.id,
                 });
             }

@@ -6,7 +6,7 @@ use crate::{
     event::{Event, Subject},
     operations::{
         commit_job::{CommitOutcome, wrong_job},
-        job_purpose::Purpose,
+        job_purpose::JobPurpose,
         release_day, run_completion,
     },
     queue::JobClaim,
@@ -33,7 +33,7 @@ impl Store {
     ) -> Result<CommitOutcome> {
         let dataset_bytes = self.artifacts().size_bytes(dataset).await?;
         self.commit(claim, now, async |tx, purpose| match purpose {
-            Purpose::Scoring(EvaluationRun { id, proposal, .. }) => {
+            JobPurpose::Scoring(EvaluationRun { id, proposal, .. }) => {
                 evaluations::set_finished(tx, id, result, dataset, dataset_blake3, now).await?;
                 if let Some(dataset_bytes) = dataset_bytes {
                     retentions::set_dataset_bytes(tx, id, dataset_bytes).await?;

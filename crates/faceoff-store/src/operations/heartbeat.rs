@@ -5,7 +5,7 @@ use crate::{
     error::Result,
     event::Actor,
     operations::{
-        job_purpose::{self, Purpose},
+        job_purpose::{self, JobPurpose},
         lease_release::event_subject,
     },
     queue::{self, JobClaim},
@@ -57,7 +57,7 @@ impl Store {
             let Some(kind) = queue::renew(tx, claim, 0, lease_s, now).await? else {
                 return Ok(false);
             };
-            if let Purpose::Game(id) = job_purpose::of_job(tx, claim.job, &kind).await? {
+            if let JobPurpose::Game(id) = job_purpose::of_job(tx, claim.job, &kind).await? {
                 game_attempts::transfer(tx, id, new_holder).await?;
             }
             Ok(true)

@@ -97,33 +97,33 @@ pub(crate) const PLATFORM_ACCOUNT_OWNER: &str = "";
 
 /// The submission, game, shard or evaluation that a job is for.
 #[derive(Debug)]
-pub(crate) enum Purpose {
+pub(crate) enum JobPurpose {
     Validation(SubmissionId),
     Game(GameId),
     Shard { run: RunId, shard: Shard },
     Scoring(EvaluationRun),
 }
 
-/// Purpose of a job, from its stored kind and the row that refers to it.
+/// The purpose of a job, from its stored kind and the row that refers to it.
 pub(crate) async fn of_job(
     connection: &mut SqliteConnection,
     job: Uuid,
     stored_kind: &str,
-) -> Result<Purpose> {
+) -> Result<JobPurpose> {
     let purpose = match JobKind::ALL
         .into_iter()
         .find(|kind| kind.stored_name() == stored_kind)
     {
         Some(JobKind::Validation) => validation_runs::of_job(connection, job)
             .await?
-            .map(Purpose::Validation),
-        Some(JobKind::Game) => games::of_job(connection, job).await?.map(Purpose::Game),
+            .map(JobPurpose::Validation),
+        Some(JobKind::Game) => games::of_job(connection, job).await?.map(JobPurpose::Game),
         Some(JobKind::Shard) => shards::of_job(connection, job)
             .await?
-            .map(|(run, shard)| Purpose::Shard { run, shard }),
+            .map(|(run, shard)| JobPurpose::Shard { run, shard }),
         Some(JobKind::Scoring) => evaluation_runs::of_scoring_job(connection, job)
             .await?
-            .map(Purpose::Scoring),
+            .map(JobPurpose::Scoring),
         None => None,
     };
     purpose.ok_or_else(|| {

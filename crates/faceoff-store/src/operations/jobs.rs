@@ -4,7 +4,7 @@
 use crate::{
     operations::runs::RunOwner,
     queue::JobClaim,
-    tables::{plan::RunPlan, runs::Run, shards::Shard, submissions::Submission},
+    tables::{run_plan::RunPlan, runs::Run, shards::Shard, submissions::Submission},
 };
 use faceoff_types::{
     BundleRef, EvaluationId, GameId, Ruleset, Seed, StageRuntimes, TournamentRules,

@@ -8,7 +8,7 @@ use crate::{
     tables::{
         days,
         evaluation_specs::{self, EvaluationSpec},
-        plan::RunPlan,
+        run_plan::RunPlan,
         runs::Run,
     },
     write::Tx,

@@ -10,12 +10,11 @@ use crate::{
     queue::NewJob,
     store::Store,
     tables::{
-        counting_evaluations, days,
+        board_freezes, counting_evaluations, days,
         evaluation_specs::{self, EvaluationSpec},
         evaluations::{self, EvaluationState, Failure, ProposedEvaluation},
-        freezes,
-        plan::RunPlan,
         proposals::{self, Proposal, ProposalKind, ProposalOutcome},
+        run_plan::RunPlan,
         runs as run_rows,
         runs::Run,
         season, sign_offs, stage_runtimes,
@@ -295,7 +294,7 @@ impl Store {
                     "{open} of its evaluations are queued or running: wait for their end"
                 ));
             }
-            if let Some(frozen) = freezes::find(tx, proposal.stage).await? {
+            if let Some(frozen) = board_freezes::find(tx, proposal.stage).await? {
                 return StoreError::conflict(format!(
                     "the boards of the stage are frozen since {}: unfreeze them first",
                     frozen.at

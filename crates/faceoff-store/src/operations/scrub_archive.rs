@@ -168,7 +168,7 @@ pub(crate) async fn scrub(
     }
     if edition == Edition::Public {
         check_summarised(connection, summary_version).await?;
-        forget_lifted_disqualifications(connection).await?;
+        remove_lifted_disqualifications(connection).await?;
         keep_public_events(connection).await?;
     }
     for (scope, sql) in STEPS {
@@ -249,7 +249,7 @@ async fn check_summarised(connection: &mut SqliteConnection, version: u32) -> Re
 }
 
 /// Removes disqualifications that were lifted. A disqualification is a public event, a reinstatement is not.
-async fn forget_lifted_disqualifications(connection: &mut SqliteConnection) -> Result<()> {
+async fn remove_lifted_disqualifications(connection: &mut SqliteConnection) -> Result<()> {
     sqlx::query(
         "DELETE FROM events WHERE kind = 'team_disqualified' AND EXISTS
            (SELECT 1 FROM events r WHERE r.kind = 'team_reinstated' AND r.subject_kind = events.subject_kind

@@ -8,8 +8,9 @@ use crate::{
     operations::start_day::{self, CutoffDate},
     store::Store,
     tables::{
+        board_freezes,
         evaluations::Evaluation,
-        freezes, proposals, season, sign_offs,
+        proposals, season, sign_offs,
         stages::{self, Stage, StagePhase},
     },
     write::Tx,
@@ -61,7 +62,7 @@ async fn check_ready_for_sign_off(tx: &mut Tx, stage: &Stage) -> Result<()> {
             stage.name.as_str()
         ));
     }
-    if let Some(frozen) = freezes::find(tx, stage.id).await? {
+    if let Some(frozen) = board_freezes::find(tx, stage.id).await? {
         return StoreError::conflict(format!(
             "the boards of the stage {:?} are frozen since {}: unfreeze them first",
             stage.name.as_str(),

@@ -6,7 +6,7 @@ use crate::{
     event::{Event, Subject},
     operations::{
         commit_job::{CommitOutcome, wrong_job},
-        job_purpose::Purpose,
+        job_purpose::JobPurpose,
     },
     queue::JobClaim,
     store::Store,
@@ -29,7 +29,7 @@ impl Store {
         now: Timestamp,
     ) -> Result<CommitOutcome> {
         self.commit(claim, now, async |tx, purpose| {
-            let Purpose::Validation(id) = purpose else {
+            let JobPurpose::Validation(id) = purpose else {
                 return Err(wrong_job("validation run", &purpose));
             };
             let subject = Subject::Submission(id);

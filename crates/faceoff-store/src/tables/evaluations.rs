@@ -5,7 +5,8 @@ use crate::{
     column::{Instant, Json},
     error::{Result, StoreError},
     tables::{
-        decision_records::DecisionRecord, plan::RunPlan, progress::RunProgress, runs::RunState,
+        decision_records::DecisionRecord, run_plan::RunPlan, run_progress::RunProgress,
+        runs::RunState,
     },
 };
 use faceoff_types::{

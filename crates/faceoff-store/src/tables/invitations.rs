@@ -161,7 +161,7 @@ pub(crate) async fn list(
 }
 
 /// Deletes at most `limit` invitations that were revoked, or expired unused, at `ended_before` or earlier. Returns their number.
-pub(crate) async fn forget_ended(
+pub(crate) async fn delete_ended(
     connection: &mut SqliteConnection,
     ended_before: Timestamp,
     limit: u32,

@@ -277,7 +277,7 @@ pub(crate) async fn valid(
 /// Deletes at most `limit` tokens and sessions that ended at `ended_before` or earlier. Credentials that were created with a
 /// deleted token are attributed to the token that created it, so that they still end with that one. Tokens of the operator stay: a revoked
 /// one in the file of a restored data folder must be recognised. Returns the number of tokens.
-pub(crate) async fn forget_ended(
+pub(crate) async fn delete_ended(
     connection: &mut SqliteConnection,
     ended_before: Timestamp,
     limit: u32,

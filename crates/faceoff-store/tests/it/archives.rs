@@ -7,7 +7,7 @@ use faceoff_types::*;
 use sqlx::{AssertSqlSafe, Connection, SqliteConnection};
 use std::{collections::BTreeMap, path::Path, time::Duration};
 
-/// Columns of the tables in the public archive. A new column must be reviewed in `scrub.rs` (is it public?) and then
+/// Columns of the tables in the public archive. A new column must be reviewed in `scrub_archive.rs` (is it public?) and then
 /// listed here. A table that is not listed is emptied there.
 const PUBLIC_COLUMNS: &[(&str, &str)] = &[
     ("ablation_runs", "ablation_id run_id"),

@@ -6,7 +6,7 @@ use crate::{
     event::{Event, Subject},
     operations::{
         commit_job::{CommitOutcome, wrong_job},
-        job_purpose::Purpose,
+        job_purpose::JobPurpose,
         jobs::{Job, RunSeeds},
     },
     queue::{self, JobClaim, NewJob, SlotTimeAccount},
@@ -201,7 +201,7 @@ impl Store {
         now: Timestamp,
     ) -> Result<CommitOutcome> {
         self.commit(claim, now, async |tx, purpose| {
-            let Purpose::Game(id) = purpose else {
+            let JobPurpose::Game(id) = purpose else {
                 return Err(wrong_job("game", &purpose));
             };
             let game = games::find(tx, id).await?;
