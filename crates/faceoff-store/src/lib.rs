@@ -6,6 +6,10 @@
 //! reads rows for the API and the pages. Every change goes through the function `Store::write`, which also
 //! appends to the events table and then wakes listeners. A process killed at any point leaves either the
 //! whole change or none of it.
+//!
+//! The other modules: `column` has the Rust types of columns, `schema` migrates a database, `readers` and `database` have its
+//! connections, `signals` notifies listeners in this process, `program` is the version of Faceoff that opens a database.
+//!
 //! The store runs no agent, computes no score and reads no clock: instants are passed in. Per-step
 //! data never enters the database.
 //!

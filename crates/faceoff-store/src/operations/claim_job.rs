@@ -70,14 +70,14 @@ impl Store {
                     format!("{MAX_LEASES} workers died while running it")
                 } else {
                     match describe_job(tx, &leased, worker).await {
-                        // It waits outside the queue until it may start.
+                        // A game of a paused tournament: it waits, without a lease, until the tournament is resumed.
                         Ok(None) => {
                             queue::park(tx, leased.id.0).await?;
                             continue;
                         }
                         Ok(Some(job)) => {
                             if leased.attempts > 1 {
-                                // Ends of leases are no events of their own: this line tells why a job runs once more.
+                                // The end of a lease is not logged: this line shows that a job runs once more.
                                 tracing::info!(job = %leased.id.0, attempt = leased.attempts, "a job is leased again");
                             }
                             let lease = SignedDuration::from_secs(lease_s.into());
@@ -106,7 +106,7 @@ impl Store {
     }
 }
 
-/// Reads the rows that a leased job refers to. `None`: the job must not start now.
+/// Reads the rows that a leased job refers to. `None`: the job must not start now, because its tournament is paused.
 async fn describe_job(tx: &mut Tx, leased: &LeasedJob, worker: &str) -> Result<Option<Job>> {
     let retries = leased.attempts.saturating_sub(1);
     let job = match job_purpose::of_job(tx, leased.id.0, &leased.kind).await? {
@@ -195,7 +195,7 @@ async fn read_run(tx: &mut Tx, id: RunId) -> Result<(Run, RunSeeds)> {
     Ok((run, seeds))
 }
 
-/// The submission that plays a run of tasks alone.
+/// The submission of a run. A run has exactly one, although the table of contestants could hold several.
 async fn single_contestant(tx: &mut Tx, run: RunId) -> Result<Submission> {
     let contestants: Vec<SubmissionId> = run_rows::contestants(tx, run).await?;
     match contestants[..] {

@@ -40,7 +40,7 @@ pub(crate) async fn event_subject(
     })
 }
 
-/// Drops a job after platform faults, and ends the submission, run or game that it belongs to.
+/// Drops a job after platform faults, and ends what it belongs to: a validation run, a run, a scoring or a game.
 pub(crate) async fn give_up(tx: &mut Tx, job: Uuid, stored_kind: &str, reason: &str) -> Result<()> {
     queue::drop_jobs(tx, &[job]).await?;
     match job_purpose::of_job(tx, job, stored_kind).await {

@@ -40,7 +40,7 @@ pub enum Reevaluation {
     DayWithNewestRules(StageDay),
 }
 
-/// One evaluation of a proposal, before it is queued.
+/// One evaluation of a proposal, before it is queued. `replaces` is the evaluation that it repeats.
 struct ProposedRun {
     submission: SubmissionId,
     team: TeamId,
@@ -93,7 +93,7 @@ async fn reevaluation_runs(
     }
     let has_newest_rules =
         |spec: &EvaluationSpec| newest.is_some_and(|stage| stage.rules.number == spec.revision);
-    let done_teams: HashSet<TeamId> = all
+    let teams_with_newest_rules: HashSet<TeamId> = all
         .iter()
         .filter(|spec| has_newest_rules(spec))
         .map(|spec| spec.team)
@@ -101,7 +101,7 @@ async fn reevaluation_runs(
     let mut proposed = Vec::new();
     for spec in all
         .into_iter()
-        .filter(|spec| !done_teams.contains(&spec.team))
+        .filter(|spec| !teams_with_newest_rules.contains(&spec.team))
     {
         let submission = submissions::find(tx, spec.submission).await?;
         // In a proposal for several teams, a submission with a deleted bundle is left out. A proposal for this submission

@@ -1,6 +1,6 @@
-//! Scrubbing: removal of everything from a copied database that its archive must not contain. An archive has two
-//! editions: the public one, and one for the organisers. Triggers are off meanwhile, and references between rows are
-//! checked at the end.
+//! Scrubbing: removal of everything from a copied database that its archive (the season in one file) must not contain. An archive
+//! has two editions: the public one, and one for the organisers. The database's triggers are dropped meanwhile, since they would
+//! refuse some of these changes. References between rows are checked at the end.
 
 use crate::{
     error::{Result, StoreError},

@@ -69,13 +69,14 @@ async fn check_ready_for_sign_off(tx: &mut Tx, stage: &Stage) -> Result<()> {
             frozen.at
         ));
     }
-    let proposals = proposals::all(tx).await?.into_iter();
-    let proposals =
-        proposals.filter(|proposal| proposal.stage == stage.id && proposal.outcome.is_none());
-    let proposals = proposals.count();
-    if proposals > 0 {
+    let undecided_count = proposals::all(tx)
+        .await?
+        .into_iter()
+        .filter(|proposal| proposal.stage == stage.id && proposal.outcome.is_none())
+        .count();
+    if undecided_count > 0 {
         return StoreError::conflict(format!(
-            "{proposals} trials or proposed re-evaluations of the stage {:?} are pending: apply or drop them first",
+            "{undecided_count} trials or proposed re-evaluations of the stage {:?} are pending: apply or drop them first",
             stage.name.as_str()
         ));
     }

@@ -76,6 +76,7 @@ struct OpenJob {
     /// Jobs of a smaller batch come first within a lane; within a batch and account, those with a smaller `queue_no`. The batch is the
     /// time of the cutoff or request in milliseconds, the matchday or replay number of a game, or 0.
     batch: i64,
+    /// Rises with every queued job.
     queue_no: i64,
     is_leased: bool,
     /// For a leased job: when its lease expires.
@@ -86,7 +87,7 @@ struct OpenJob {
     urgency: u32,
     /// Number of episodes of a shard.
     episodes: Option<u32>,
-    /// Owner of the account: a team, a tournament, or empty for the platform.
+    /// Owner of the account: a team, a tournament, or empty for the platform. Not a lease holder.
     holder: String,
     run: Option<RunId>,
     validation_of: Option<SubmissionId>,

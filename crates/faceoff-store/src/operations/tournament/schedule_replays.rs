@@ -33,11 +33,11 @@ async fn counting_games(tx: &mut Tx, id: TournamentId, mut games: Vec<Game>) -> 
         .collect();
     games.retain(|game| {
         let had_left = |team: &TeamId| {
-            let entry_and_departure = game
+            let game_and_departure_rounds = game
                 .purpose
                 .schedule_entry()
                 .zip(departure_rounds.get(team));
-            entry_and_departure
+            game_and_departure_rounds
                 .is_some_and(|(schedule_entry, from_round)| schedule_entry.round >= *from_round)
         };
         matches!(game.state, GameState::Played(_)) && !game.teams.iter().any(had_left)
