@@ -1,4 +1,5 @@
-//! Periodic deletion of what is not needed any more: recordings, dropped datasets, bundles that failed validation, and ended credentials.
+//! Periodic deletion of what is not needed any more: recordings, datasets of dropped proposals, bundles that failed validation or have
+//! no submission, and ended credentials.
 
 use crate::{
     boxed,

@@ -31,7 +31,7 @@ pub enum CommitOutcome {
     LeaseLost,
 }
 
-/// The error for a claim on one kind of job that is committed as another kind.
+/// The error for a claim that is committed with the result of another kind of job.
 pub(crate) fn wrong_job(expected: &str, purpose: &JobPurpose) -> StoreError {
     StoreError::Conflict(format!(
         "the claim is not on a {expected}, but on {purpose:?}"

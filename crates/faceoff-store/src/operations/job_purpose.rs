@@ -15,8 +15,8 @@ use faceoff_types::{GameId, RunId, SubmissionId};
 use sqlx::SqliteConnection;
 use uuid::Uuid;
 
-/// Kind of a job. The queue stores its name. Some names are those of earlier versions: a validation run was called a smoke run,
-/// and scoring finalising.
+/// Kind of a job. The queue stores its name. Some names are those of earlier versions: `smoke` for a validation run, `finalise` for
+/// scoring.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum JobKind {
     Validation,

@@ -39,7 +39,8 @@ pub(crate) async fn record_run_start(tx: &mut Tx, run: RunId, owner: RunOwner) -
     Ok(())
 }
 
-/// Ends a run. Its owner gets the next step (scoring, or its end).
+/// Ends a run, and continues with its owner. The scoring of an evaluation is queued after a complete run; an ablation is finished
+/// after the last of its runs. Otherwise the owner ends without a result.
 pub(crate) async fn end_run(
     tx: &mut Tx,
     run: RunId,

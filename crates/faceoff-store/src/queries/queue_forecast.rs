@@ -72,6 +72,7 @@ pub struct EvaluationBacklog {
 
 /// An open job with its purpose.
 struct OpenJob {
+    /// Number of its account.
     account: i64,
     /// Jobs of a smaller batch come first within a lane; within a batch and account, those with a smaller `queue_no`. The batch is the
     /// time of the cutoff or request in milliseconds, the matchday or replay number of a game, or 0.
@@ -93,7 +94,9 @@ struct OpenJob {
     validation_of: Option<SubmissionId>,
     scoring_of: Option<EvaluationId>,
     game: Option<GameId>,
+    /// Length of a game by the tournament's rules, in control steps.
     game_steps: Option<u32>,
+    /// Is the game's tournament paused?
     is_paused: bool,
 }
 

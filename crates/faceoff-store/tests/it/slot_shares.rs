@@ -305,7 +305,7 @@ async fn upload_flood_delays_other_team_by_one_job() {
 async fn slot_time_is_equal_for_waiting_teams() {
     /// The longest duration of a job.
     const MAX_DURATION_S: i64 = 600;
-    // Names, numbers of shards and durations of a shard in seconds: each team needs 1800 sim.
+    // Names, numbers of shards and durations of a shard in seconds: each team needs 1800 s.
     let teams = [("Slow", 3, 600), ("Middle", 15, 120), ("Quick", 60, 30)];
     for slots in [1, 3] {
         // In several orders, so that being first is no advantage.
