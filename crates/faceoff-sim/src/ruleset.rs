@@ -1,4 +1,4 @@
-//! Rulesets: versions of the simulator and of the scoring.
+//! Rulesets: numbered versions of the simulator and of the scoring. `docs/rules.md` has the current one in full.
 
 use faceoff_types::Ruleset;
 
@@ -10,17 +10,17 @@ use faceoff_types::Ruleset;
 pub enum AirHockeyRuleset {
     /// Numbers in actions must be finite, and velocities are unbounded.
     First,
-    /// Adds the daily cutoff, bounds on numbers and on the simulated world, and time budgets. The clock of a
-    /// step starts at the first attempt to write the `step` line.
+    /// Adds the daily cutoff (the moment at which submissions are frozen), bounds on numbers and on the simulated world, and
+    /// time budgets. The clock of a step starts at the first attempt to write the protocol's `step` line to the agent.
     Second,
     /// Changes the timing of steps; the simulation is the one of the second ruleset.
     ///
     /// * The clock of a step starts before the evaluator touches anything that it shares with the agent.
-    /// * Of the evaluator's own time, only its thread's wait for a CPU is subtracted.
+    /// * Of the evaluator's own time within a step, only its thread's wait for a CPU is subtracted from the step's time.
     /// * CPU time that an agent uses between its answer and the next observation counts for the next step. In a
     ///   game on shared CPUs, an agent that has answered is frozen until then.
-    /// * On the agent's CPUs, a wait counts as host interference only for threads that then contributed to the
-    ///   answer.
+    /// * Host interference is time that other load took from the agent, and is not charged to it. A wait on the agent's CPUs
+    ///   counts as such only for threads that then contributed to the answer.
     Third,
 }
 
@@ -31,7 +31,7 @@ impl AirHockeyRuleset {
     /// The ruleset of new runs.
     pub const CURRENT: Self = Self::Third;
 
-    /// The name in files and tables.
+    /// The name in files and in the database.
     #[must_use]
     pub const fn name(self) -> Ruleset {
         Ruleset::new(match self {

@@ -1,6 +1,8 @@
 //! Artifacts: the files of the season (bundles, recordings, datasets) in an object store. The database names each one by
-//! its key. Two kinds are for replays in the browser: *clips* are the recorded motions of a dataset's episodes, and the
-//! *parts* of an ablation are the clips of its single shards until they are merged.
+//! its key. Two kinds are for replays in the browser: *clips* are the recorded motions of a dataset's episodes. An *ablation*
+//! evaluates a submission under each perturbation alone; its *parts* are the clips of its single shards, until they are merged.
+//!
+//! A *folder* of artifacts is all that have a common key prefix, which ends before a slash.
 
 use crate::{
     boxed,
@@ -45,9 +47,12 @@ pub struct Artifacts {
 /// The clips of a shard of an ablation.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AblationPart {
+    /// The perturbations under which the shard was played.
     pub profile: Profile,
     pub task: Task,
+    /// The shard's first episode.
     pub first_episode: u32,
+    /// The artifact's key.
     pub key: String,
 }
 
@@ -206,7 +211,7 @@ impl Artifacts {
         }
     }
 
-    /// The path of an artifact's file, to read parts of it. It must not be written to.
+    /// The path of an artifact's file, for callers that read pieces of it. It must not be written to.
     ///
     /// # Errors
     /// [`StoreError::Artifacts`] if `key` is not a valid key.
@@ -292,7 +297,7 @@ impl Artifacts {
         Ok(())
     }
 
-    /// The keys of all artifacts under `prefix/` that were stored at `until` or earlier.
+    /// The keys of all artifacts under `prefix/` that were stored at `until` or earlier, by the times of the files.
     pub(crate) async fn stored_until(&self, prefix: &str, until: Timestamp) -> Result<Vec<String>> {
         let until = until.as_millisecond();
         self.objects
@@ -328,9 +333,9 @@ impl Artifacts {
                 .as_ref()
                 .strip_prefix(kept_key)
                 .is_some_and(|rest| {
-                    let belongs_to_kept =
+                    let belongs_to_kept_key =
                         rest.is_empty() || rest.starts_with('/') || rest == CLIPS_SUFFIX;
-                    belongs_to_kept && !kept_key.is_empty()
+                    belongs_to_kept_key && !kept_key.is_empty()
                 });
             if !is_kept {
                 self.delete(location.as_ref()).await?;
@@ -351,8 +356,8 @@ impl Artifacts {
     }
 }
 
-/// `LocalFileSystem` writes to `NAME#NUMBER` beside the file and renames that when it is complete; its
-/// keys cannot contain a `#`.
+/// Removes the incomplete files in a folder. `LocalFileSystem` writes to `NAME#NUMBER` beside the file and renames that when it
+/// is complete; its keys cannot contain a `#`.
 fn remove_incomplete(folder: &Path, before: SystemTime) -> std::io::Result<usize> {
     let mut removed = 0;
     for entry in std::fs::read_dir(folder)? {

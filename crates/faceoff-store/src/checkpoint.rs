@@ -19,7 +19,7 @@ use std::{
 /// waits for readers of other processes.
 const READER_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Clears the flag on drop, so that the log can be emptied again however this attempt ends.
+/// Clears `is_emptying` of the log on drop, so that the log can be emptied again however this attempt ends.
 struct EmptyingGuard<'a>(&'a AtomicBool);
 
 impl Drop for EmptyingGuard<'_> {
@@ -53,6 +53,7 @@ impl Database {
         Ok(())
     }
 
+    /// Tries to empty the log, unless another attempt is running. The first failure in a row is logged, and the success after it.
     async fn empty_log(&self) {
         if self.log.is_emptying.swap(true, Ordering::AcqRel) {
             return;
@@ -60,18 +61,18 @@ impl Database {
         let _guard = EmptyingGuard(&self.log.is_emptying);
         let bytes_before = self.log.bytes();
         let outcome = self.truncate_log().await;
-        let had_failed = self.log.due_bytes.load(Ordering::Relaxed) > MAX_LOG_BYTES;
+        let last_attempt_failed = self.log.due_bytes.load(Ordering::Relaxed) > MAX_LOG_BYTES;
         match outcome {
             Ok(true) => {
                 self.log.due_bytes.store(MAX_LOG_BYTES, Ordering::Relaxed);
-                if had_failed {
+                if last_attempt_failed {
                     tracing::info!(bytes = bytes_before, "the database's log is emptied");
                 }
             }
             Ok(false) | Err(_) => {
                 let due_bytes = bytes_before.saturating_add(MAX_LOG_BYTES / 4);
                 self.log.due_bytes.store(due_bytes, Ordering::Relaxed);
-                if !had_failed {
+                if !last_attempt_failed {
                     tracing::warn!(
                         bytes = bytes_before,
                         cause = outcome.err().map_or_else(
@@ -85,7 +86,7 @@ impl Database {
         }
     }
 
-    /// Returns false if a reader of another process blocks the checkpoint.
+    /// Copies the whole log into the database file and empties it. False if a reader blocks the checkpoint.
     async fn truncate_log(&self) -> Result<bool> {
         let mut writer = self.write.acquire().await?;
         // While this function holds all of this process's read connections, no reader of this process is active.

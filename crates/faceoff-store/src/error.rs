@@ -9,7 +9,7 @@ use std::{error::Error, fmt::Display};
 /// Why an operation of the store failed.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    /// There is no team, submission, evaluation or artifact of this id.
+    /// There is no entity or artifact with the given id or key; the text names its kind.
     #[error("{0} not found")]
     NotFound(&'static str),
     /// The outcomes of an old run's single episodes were removed; its summary and its dataset remain.
@@ -21,7 +21,7 @@ pub enum StoreError {
     /// Names that look alike count as the same; this is the existing one.
     #[error("a team named {0:?} exists already")]
     TeamNameTaken(String),
-    /// The cutoff of the day, or of a later one, has passed.
+    /// The cutoff (the start of the evaluations) of the day, or of a later one, has passed.
     #[error("the cutoff of {day} was at {cutoff_at}")]
     CutoffPassed {
         /// The requested day, or a later one.
@@ -77,7 +77,7 @@ pub enum StoreError {
     InvitationInvalid(String),
     /// The team has used an idempotency key for another bundle before.
     #[error("the key was used for the submission {submission}, whose bundle is another one")]
-    KeyUsed {
+    IdempotencyKeyUsed {
         /// The earlier submission.
         submission: SubmissionId,
     },
@@ -124,9 +124,9 @@ pub enum StoreError {
     NewerDatabase {
         /// Number of the newest migration in the database.
         schema: i64,
-        /// The version that opened the database last.
+        /// The version that opened the database last; `None` if it did not record itself.
         program: Option<String>,
-        /// The running version.
+        /// The version that refuses the database.
         this: Program,
     },
     #[error("database: {0}")]

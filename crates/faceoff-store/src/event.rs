@@ -2,12 +2,12 @@
 
 mod actor;
 mod kinds;
-mod parse;
-mod public;
+mod parse_error;
 mod subject;
+mod visibility;
 
 pub use actor::Actor;
-pub use parse::ParseEventError;
+pub use parse_error::ParseEventError;
 pub use subject::Subject;
 
 use faceoff_types::{
@@ -53,11 +53,13 @@ pub enum Event {
     /// An invitation link was created.
     Invited {
         invitation: InvitationId,
-        /// `organiser`, `member`, `founder` or `return`.
+        /// `organiser`, `member`, `founder` (of a new team) or `return` (an existing user gets access again).
         role: String,
+        /// A note of its author, to recognise it in lists.
         note: String,
         expires_at: Timestamp,
     },
+    /// An unused invitation link was revoked.
     InvitationRevoked {
         invitation: InvitationId,
     },
@@ -299,7 +301,7 @@ pub enum Event {
         first_episode: u32,
         /// One past the last episode.
         end_episode: u32,
-        /// Episodes that ended by a fault of the agent.
+        /// Number of episodes that ended by a fault of the agent.
         agent_faults: u32,
     },
     /// A job failed by a platform fault; it is retried, or was given up.
@@ -314,15 +316,16 @@ pub enum Event {
     },
     /// The day's cutoff: its evaluations were queued, each with its own event.
     DayStarted {
+        /// Their number.
         evaluations: u32,
     },
     /// The day's deadline passed: its open evaluations were ended, each with its own event.
     DayOverdue {
-        /// Evaluations that were not complete.
+        /// Number of evaluations that were ended.
         not_played: u32,
     },
-    /// The day's seed is public, because its last evaluation has ended. In events from before there were cutoffs: because
-    /// its first dataset was downloaded.
+    /// The day's seed is public from now on, because its last evaluation has ended. Events from before there were cutoffs have
+    /// another cause: the day's first dataset was downloaded.
     DayReleased,
     /// A day that was missed on its date was started later.
     MissedDayStarted {
@@ -381,7 +384,9 @@ pub enum Event {
     },
     /// The stage is signed off: its results are final.
     StageFinalised,
+    /// A tournament was created; test games and friendly games are possible.
     TournamentOpened {
+        /// Tournaments have the same type of name as stages.
         name: StageName,
         /// Everything that results depend on.
         rules: Box<TournamentRules>,
@@ -482,7 +487,7 @@ pub enum Event {
     },
     /// The team changed whether it accepts friendly games that other teams request.
     FriendlyGamesDeclined {
-        /// True if it declines them.
+        /// False if it accepts them again.
         declines: bool,
     },
     WebhookCreated {
@@ -520,13 +525,14 @@ pub enum Event {
         reason: String,
     },
     QueueResumed,
-    /// The server's time follows the system clock, which was set.
+    /// An organiser accepted that the system clock was set: from now on the server's time follows it again.
     ClockStepAccepted {
-        /// How far it was ahead or behind.
+        /// How far the system clock was ahead of the server's time or behind it, as text.
         size: String,
     },
     /// Results of a remote worker are rejected from now on.
     WorkerBanned {
+        /// Name of the worker.
         worker: String,
         reason: String,
         /// Number of shards, run by this worker, that are repeated.

@@ -6,6 +6,10 @@
 //! reads rows for the API and the pages. Every change goes through the function `Store::write`, which also
 //! appends to the events table and then wakes listeners. A process killed at any point leaves either the
 //! whole change or none of it.
+//!
+//! The other modules: `column` has the Rust types of columns, `schema` migrates a database, `readers` and `database` have its
+//! connections, `signals` notifies listeners in this process, `program` is the version of Faceoff that opens a database.
+//!
 //! The store runs no agent, computes no score and reads no clock: instants are passed in. Per-step
 //! data never enters the database.
 //!
@@ -51,25 +55,25 @@ pub use free_space::{DiskSpace, FreeSpace};
 pub use health::{Health, QueueHealth};
 pub use operations::{
     announcements::MAX_OPEN_QUESTIONS,
+    archive_snapshot::{DatabaseSnapshot, MissingSummaries},
     backup::CheckedDatabase,
-    claim::MAX_LEASES,
+    claim_job::MAX_LEASES,
     cleanup::{
         ENDED_CREDENTIALS_KEPT_FOR, INVALID_LOGS_KEPT, PLATFORM_FAILED_BUNDLES_KEPT_FOR,
         RECORDINGS_KEPT_FOR,
     },
-    commit::CommitOutcome,
+    commit_job::CommitOutcome,
     ended_credentials::EndedCredentials,
     invitations::{CodeStatus, JoinOutcome, JoinRequest, MAX_OPEN_INVITATIONS, NewInvitation},
+    job_purpose::JobFilter,
     jobs::{ClaimedJob, Job, RunSeeds},
     lease_release::MAX_PLATFORM_FAULTS,
     proposals::Reevaluation,
-    purpose::JobFilter,
     registrations::{MAX_PENDING_REGISTRATIONS, NewRegistration},
     requester::Requester,
-    rerun::RERUN_PAUSES_S,
+    rerun_evaluation::RERUN_PAUSES_S,
     retention::{FILES_KEPT_FOR, RemovalSummary},
     runs::RunOwner,
-    snapshot::{DatabaseSnapshot, MissingSummaries},
     stages::{NewStage, StageChange},
     submission_description::SubmissionDescription,
     teams::TeamChange,
@@ -79,7 +83,7 @@ pub use operations::{
     },
     tournament::{
         entrants::DepartureRequest,
-        open::{NewTournament, TournamentChange},
+        open_tournament::{NewTournament, TournamentChange},
         schedule_replays::MAX_SCHEDULE_REPLAYS,
     },
     webhooks::{
@@ -121,13 +125,13 @@ pub use tables::{
     },
     invitations::{Invitation, InvitationRole, InvitationState},
     job_durations::JobDurations,
-    plan::RunPlan,
-    progress::{RunProgress, ShardProgress},
     proposals::{Proposal, ProposalKind, ProposalOutcome},
     questions::{Question, QuestionAnswer},
     registrations::{Registration, RegistrationState},
     required_artifacts::RequiredArtifact,
     rounds::{DrawnMatchday, DrawnRound, RoundBye, TournamentRound},
+    run_plan::RunPlan,
+    run_progress::{RunProgress, ShardProgress},
     runs::Run,
     season::Season,
     shards::{Shard, ShardCommit},

@@ -3,7 +3,7 @@
 use crate::{
     error::{Result, StoreError},
     program::Program,
-    tables::programs,
+    tables::program_versions,
 };
 use sqlx::{SqliteConnection, migrate::Migrator};
 
@@ -60,7 +60,7 @@ pub(crate) struct SchemaBefore {
 pub(crate) async fn check_migratable(connection: &mut SqliteConnection) -> Result<SchemaBefore> {
     let (applied, last) = (
         newest_applied(connection).await?,
-        programs::last(connection).await?,
+        program_versions::last(connection).await?,
     );
     let this = this_program();
     match applied {
@@ -80,7 +80,7 @@ pub(crate) async fn record_program(
 ) -> Result<Option<Upgrade>> {
     let this = this_program();
     if before.last.as_ref() != Some(&this) {
-        programs::put(connection, &this).await?;
+        program_versions::put(connection, &this).await?;
     }
     Ok(before
         .applied

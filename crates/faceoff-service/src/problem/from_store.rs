@@ -84,7 +84,7 @@ impl From<StoreError> for Problem {
             error @ StoreError::InvitationInvalid(_) => {
                 Self::new(ProblemKind::InvitationInvalid, error.to_string())
             }
-            StoreError::KeyUsed { submission } => Self::new(
+            StoreError::IdempotencyKeyUsed { submission } => Self::new(
                 ProblemKind::InvalidContent,
                 format!(
                     "the header Idempotency-Key has the key of the submission {submission}, whose bundle is another one; use a new \

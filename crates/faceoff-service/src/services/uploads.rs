@@ -93,7 +93,7 @@ fn same_bundle(earlier: Submission, received: &blake3::Hash) -> Result<Submissio
     if earlier.bundle.blake3 == received.to_string() {
         return Ok(earlier);
     }
-    Err(StoreError::KeyUsed {
+    Err(StoreError::IdempotencyKeyUsed {
         submission: earlier.id,
     }
     .into())

@@ -4,7 +4,7 @@ use crate::AirHockeyTask;
 use crate::{
     model::{CONTROL_STEP_S, EE_DESIRED_HEIGHT_M, JOINTS, LINKS, TOOL},
     table::{
-        frames::side,
+        frames::axis_sign,
         geometry::{PUCK, TABLE},
     },
 };
@@ -58,10 +58,10 @@ pub fn env_info_for(robots: u32, own_robot: usize) -> EnvInfo {
         [false, true].map(|upper| std::array::from_fn(|i| if upper { limit(i) } else { -limit(i) }))
     };
     let base_frame = |robot: usize| {
-        let side = side(robot);
-        let (x, z) = (-side * TABLE.base_x_m, TABLE.base_z_m);
+        let sign = axis_sign(robot);
+        let (x, z) = (-sign * TABLE.base_x_m, TABLE.base_z_m);
         [
-            side, 0.0, 0.0, x, 0.0, side, 0.0, 0.0, 0.0, 0.0, 1.0, z, 0.0, 0.0, 0.0, 1.0,
+            sign, 0.0, 0.0, x, 0.0, sign, 0.0, 0.0, 0.0, 0.0, 1.0, z, 0.0, 0.0, 0.0, 1.0,
         ]
     };
     let robots_own_first = [own_robot, 1 - own_robot];

@@ -16,9 +16,9 @@ use crate::{
 pub struct Plant {
     /// Factors on mass and inertia of links 1…7, end effector and mallet.
     pub(crate) mass_scale: [f64; 9],
-    /// Proportional gains, N m/rad.
+    /// Proportional gains of the joints' position controllers, N m/rad.
     pub(crate) kp: [f64; JOINTS],
-    /// Derivative gains, N m s/rad.
+    /// Derivative gains of the same controllers, N m s/rad.
     pub(crate) kd: [f64; JOINTS],
     /// Viscous joint damping, N m s/rad.
     pub(crate) damping: [f64; JOINTS],
@@ -30,7 +30,7 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// The plant with the numbers of [`LINKS`].
+    /// The plant without model mismatch: the numbers of [`LINKS`].
     #[must_use]
     pub fn nominal() -> Self {
         Self::new(
@@ -51,11 +51,11 @@ impl Plant {
     ) -> Self {
         let kinematics = Kinematics::new(&[0.0; DOFS]);
         let bodies = Bodies::new(&kinematics).plant(&mass_scale);
-        let factor = Ldlt::new(&mass_matrix(&kinematics, &bodies));
+        let factorised_mass = Ldlt::new(&mass_matrix(&kinematics, &bodies));
         let inverse_inertia = std::array::from_fn(|i| {
-            let mut unit = [0.0; DOFS];
-            unit[i] = 1.0;
-            factor.solve(&unit)[i]
+            let mut unit_torque = [0.0; DOFS];
+            unit_torque[i] = 1.0;
+            factorised_mass.solve(&unit_torque)[i]
         });
         Self {
             mass_scale,

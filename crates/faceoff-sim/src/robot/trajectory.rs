@@ -72,7 +72,7 @@ pub fn interpolate(interpolation: Interpolation, from: &Setpoint, action: &[f64]
         }
         Interpolation::Cubic => polynomial(|j| {
             let (p, v) = (from.position[j], from.velocity[j]);
-            // What the action adds to a continued uniform motion, in position and velocity.
+            // Differences at the end of the step between the action and a motion that continues at velocity v.
             let dp = row(0, j) - p - v * T;
             let dv = row(1, j) - v;
             [
@@ -86,7 +86,7 @@ pub fn interpolate(interpolation: Interpolation, from: &Setpoint, action: &[f64]
         }),
         Interpolation::Quartic => polynomial(|j| {
             let (p, v, a) = (from.position[j], from.velocity[j], from.acceleration[j]);
-            // What the action adds to a continued uniform acceleration, in position and velocity.
+            // Differences at the end of the step between the action and a motion that continues at acceleration a.
             let dp = row(0, j) - p - v * T - 0.5 * a * T * T;
             let dv = row(1, j) - v - a * T;
             let (c3, c4) = (4.0 * dp - dv * T, dv * T - 3.0 * dp);
@@ -94,7 +94,7 @@ pub fn interpolate(interpolation: Interpolation, from: &Setpoint, action: &[f64]
         }),
         Interpolation::Quintic => polynomial(|j| {
             let (p, v, a) = (from.position[j], from.velocity[j], from.acceleration[j]);
-            // What the action adds to a continued uniform acceleration, in position, velocity · T and acceleration · T².
+            // As in the quartic, in position, velocity · T and acceleration · T².
             let dp = row(0, j) - p - v * T - 0.5 * a * T * T;
             let dv = (row(1, j) - v - a * T) * T;
             let da = (row(2, j) - a) * T * T;

@@ -6,27 +6,27 @@ use super::geometry::TABLE;
 
 /// Sign of a robot's x and y axes in the table frame: −1 for the second robot, whose base frame is rotated by π about z.
 #[inline(always)]
-pub fn side(robot: usize) -> f64 {
+pub fn axis_sign(robot: usize) -> f64 {
     if robot == 0 { 1.0 } else { -1.0 }
 }
 
 /// The table coordinates of the point `p`, given in a robot's base frame, m.
 #[inline(always)]
 pub fn table_from_robot(robot: usize, p: [f64; 3]) -> [f64; 3] {
-    let side = side(robot);
+    let sign = axis_sign(robot);
     [
-        side * (p[0] - TABLE.base_x_m),
-        side * p[1],
+        sign * (p[0] - TABLE.base_x_m),
+        sign * p[1],
         p[2] + TABLE.base_z_m,
     ]
 }
 
 /// The coordinates in a robot's base frame of the point `p`, given in the table frame, m.
 pub fn robot_from_table(robot: usize, p: [f64; 3]) -> [f64; 3] {
-    let side = side(robot);
+    let sign = axis_sign(robot);
     [
-        side * p[0] + TABLE.base_x_m,
-        side * p[1],
+        sign * p[0] + TABLE.base_x_m,
+        sign * p[1],
         p[2] - TABLE.base_z_m,
     ]
 }

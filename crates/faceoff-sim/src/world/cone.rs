@@ -9,10 +9,10 @@ pub const DIRECTIONS: usize = 3;
 
 /// If one of several contacts slips, they are solved one after the other in sweeps: the largest number of sweeps, and the relative change
 /// of the forces that ends them.
-const SWEEPS: usize = 20_000;
+const MAX_SWEEPS: usize = 20_000;
 const SWEEP_TOLERANCE: f64 = 1e-13;
 /// Number of directions of slip, spread over the full circle, that are tried before the search around the best one.
-const DIRECTIONS_TRIED: usize = 16;
+const SLIP_DIRECTIONS_TRIED: usize = 16;
 /// Number of bisections in that search, which narrows the direction down to rounding.
 const BISECTIONS: usize = 54;
 
@@ -40,7 +40,7 @@ pub fn solve_cone<const N: usize>(
         return force;
     }
     // Solve one contact at a time with the other forces fixed: a single contact needs one sweep.
-    for _ in 0..SWEEPS {
+    for _ in 0..MAX_SWEEPS {
         let (mut change, mut size) = (0.0f64, 0.0f64);
         for (c, &mu) in friction.iter().enumerate() {
             let first = DIRECTIONS * c;
@@ -98,15 +98,15 @@ fn solve_one_cone(
         let size = (dot(&edge, target) / dot(&edge, &response(&edge))).max(0.0);
         edge.map(|e| size * e)
     };
-    // Positive if the best edge is further round the circle, anticlockwise.
-    let gain_across = |u: [f64; 2]| {
+    // Rate at which the gain grows if the edge turns anticlockwise, up to a positive factor.
+    let gain_slope = |u: [f64; 2]| {
         let force = best_force(u);
         let residual: ContactForce = std::array::from_fn(|d| target[d] - dot(&matrix[d], &force));
         residual[2] * u[0] - residual[1] * u[1]
     };
     let mut best = unit(pull);
     let mut direction = best;
-    for _ in 1..DIRECTIONS_TRIED {
+    for _ in 1..SLIP_DIRECTIONS_TRIED {
         direction = rotate(direction, 1.0);
         if gain(direction) > gain(best) {
             best = direction;
@@ -115,7 +115,7 @@ fn solve_one_cone(
     let (mut before, mut after) = (rotate(best, -1.0), rotate(best, 1.0));
     for _ in 0..BISECTIONS {
         let middle = unit([before[0] + after[0], before[1] + after[1]]);
-        if gain_across(middle) > 0.0 {
+        if gain_slope(middle) > 0.0 {
             before = middle;
         } else {
             after = middle;
@@ -124,7 +124,7 @@ fn solve_one_cone(
     best_force(before)
 }
 
-/// Rotates by one of [`DIRECTIONS_TRIED`] parts of a full turn, forwards (+1) or backwards (−1).
+/// Rotates by a full turn divided by [`SLIP_DIRECTIONS_TRIED`], anticlockwise (`sign` +1) or clockwise (−1).
 fn rotate([x, y]: [f64; 2], sign: f64) -> [f64; 2] {
     const COS: f64 = 0.923_879_532_511_286_7;
     const SIN: f64 = 0.382_683_432_365_089_8;

@@ -8,7 +8,7 @@ use crate::{
     table::{
         contact_finder::{self, ContactPoint},
         contact_law::{MALLET, MALLETS, RIM},
-        frames::{robot_from_table, side, table_from_robot},
+        frames::{axis_sign, robot_from_table, table_from_robot},
         mallet_cylinder::MalletCylinder,
         puck::Puck,
     },
@@ -48,9 +48,9 @@ pub fn find_contacts(
 ) -> Option<Contacts> {
     let puck_xy = [puck.pose[0], puck.pose[1]];
     let cylinder = |robot: usize| {
-        let ([x, y, z], side) = (mallets[robot].axis, side(robot));
+        let ([x, y, z], sign) = (mallets[robot].axis, axis_sign(robot));
         let centre = table_from_robot(robot, mallets[robot].centre);
-        MalletCylinder::along(centre, [side * x, side * y, z])
+        MalletCylinder::along(centre, [sign * x, sign * y, z])
     };
     let puck_contacts: [Option<ContactPoint>; 2] = std::array::from_fn(|robot| {
         (robot < mallets.len())
@@ -70,14 +70,14 @@ pub fn find_contacts(
         return (!contacts.is_empty()).then_some(contacts);
     }
     let mallet_motion = |robot: usize, contact: &ContactPoint| {
-        let side = side(robot);
+        let sign = axis_sign(robot);
         let [x, y, z] = robot_from_table(robot, contact.point);
         let (axes, dq) = motion(robot);
         let jacobian = axes.map(|axis| axis.velocity_at(Vec3::new(x, y, z)));
         // In the table frame.
         let rows: [[f64; DOFS]; 3] = [
-            jacobian.map(|column| side * column.x),
-            jacobian.map(|column| side * column.y),
+            jacobian.map(|column| sign * column.x),
+            jacobian.map(|column| sign * column.y),
             jacobian.map(|column| column.z),
         ];
         let velocity = rows.map(|row| (0..DOFS).map(|i| row[i] * dq[i]).sum());

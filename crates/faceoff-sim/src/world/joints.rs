@@ -14,7 +14,7 @@ use crate::{
 use std::f64::consts::FRAC_PI_2;
 
 /// Largest number of iterations of the line search, and the relative change of the step length that ends it.
-const LINE_SEARCH_ROUNDS: usize = 60;
+const MAX_LINE_SEARCH_ITERATIONS: usize = 60;
 const LINE_SEARCH_TOLERANCE: f64 = 1e-14;
 
 /// Position of a dry friction's torque relative to its bounds.
@@ -188,7 +188,7 @@ impl JointConstraints {
         let mut t = 1.0;
         // The slope increases and is piecewise linear, with few kinks, so Newton's method ends exactly at its root. A bracket (low, high)
         // keeps it from jumping away.
-        for _ in 0..LINE_SEARCH_ROUNDS {
+        for _ in 0..MAX_LINE_SEARCH_ITERATIONS {
             let acceleration: [f64; DOFS] = std::array::from_fn(|i| start[i] + t * direction[i]);
             let slope = slope_of_residual + t * curvature - dot(&self.torques(&acceleration));
             if slope > 0.0 {

@@ -27,7 +27,7 @@ use crate::{
     robot::plant::Plant,
     table::{
         contact_finder,
-        frames::{side, table_from_robot},
+        frames::{axis_sign, table_from_robot},
         puck::{Damping, Puck},
     },
 };
@@ -159,13 +159,13 @@ impl World {
     /// Positions of a robot's driven joints, rad.
     #[must_use]
     pub fn joints(&self, robot: usize) -> [f64; JOINTS] {
-        head(&self.arms[robot].q)
+        driven(&self.arms[robot].q)
     }
 
     /// True velocities of a robot's driven joints, rad/s.
     #[must_use]
     pub fn joint_velocities(&self, robot: usize) -> [f64; JOINTS] {
-        head(&self.arms[robot].dq)
+        driven(&self.arms[robot].dq)
     }
 
     /// Low-pass filtered velocities of a robot's driven joints, rad/s.
@@ -215,10 +215,10 @@ impl World {
             vx += jacobian[i].x * arm.dq[i];
             vy += jacobian[i].y * arm.dq[i];
         }
-        let side = side(robot);
+        let sign = axis_sign(robot);
         MalletState {
             position: table_from_robot(robot, centre.to_array()),
-            velocity: [side * vx, side * vy],
+            velocity: [sign * vx, sign * vy],
         }
     }
 
@@ -239,7 +239,7 @@ impl World {
     }
 }
 
-/// The first seven numbers: those of the driven joints.
-fn head(q: &[f64; DOFS]) -> [f64; JOINTS] {
+/// The first seven numbers: those of the driven joints, without the mallet's hinges.
+fn driven(q: &[f64; DOFS]) -> [f64; JOINTS] {
     std::array::from_fn(|i| q[i])
 }

@@ -13,10 +13,10 @@ use super::{
 use crate::{dynamics::ldlt::Ldlt, model::DOFS};
 
 /// Largest number of Newton steps. If one is not enough, two or three usually are.
-const NEWTON_ROUNDS: usize = 50;
+const MAX_NEWTON_STEPS: usize = 50;
 
 /// Largest number of alternations between the solution of the joint constraints and that of the contacts.
-const CONTACT_ROUNDS: usize = 20;
+const MAX_CONTACT_ROUNDS: usize = 20;
 
 /// A joint-space inertia matrix; only the lower triangle is used.
 pub type Mass<T> = [[T; DOFS]; DOFS];
@@ -61,7 +61,7 @@ pub fn search_bound_set(
     problem: &Problem,
     acceleration: &mut [f64; DOFS],
 ) {
-    for _ in 0..NEWTON_ROUNDS {
+    for _ in 0..MAX_NEWTON_STEPS {
         let (_, newton) = newton_step(constraints, problem);
         if !constraints.classify(&newton) {
             *acceleration = newton;
@@ -97,7 +97,7 @@ pub fn accelerations_in_contact(
         puck: [0.0; 3],
         arm_torques: [[0.0; DOFS]; 2],
     };
-    for _ in 0..CONTACT_ROUNDS {
+    for _ in 0..MAX_CONTACT_ROUNDS {
         let factors: [Ldlt<f64>; 2] = std::array::from_fn(|a| {
             let arm = &arms[a.min(arms.len() - 1)];
             let (factor, without_contacts) = newton_step(&arm.constraints, &problems[a]);

@@ -26,8 +26,7 @@ impl World {
     }
 
     /// Advances by one substep. After every 20 substeps a new action is due: call [`World::command`] or [`World::hold`] first, since
-    /// otherwise the last trajectory is repeated. A world that has
-    /// diverged stays in its state.
+    /// otherwise the last trajectory is repeated. A world that has *diverged* (its next state was beyond the bounds) stays in its state.
     pub fn substep(&mut self) {
         let air_n = self.air_n;
         self.advance(1, |_| air_n);

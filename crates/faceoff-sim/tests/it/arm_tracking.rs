@@ -10,8 +10,10 @@ struct Differences {
     q: f64,
     dq: f64,
     dq_filtered: f64,
+    /// Angles of the universal joint, the two hinges on which the mallet hangs.
     universal: f64,
     ee: f64,
+    /// The values that the rules' constraints limit.
     constraints: f64,
     torque: f64,
     /// Positions and velocities in each millisecond; the others, except for the torque, are compared at control steps.

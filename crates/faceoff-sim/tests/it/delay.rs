@@ -37,7 +37,7 @@ fn puck_is_observed_one_or_two_control_steps_late() {
     }
     let two_steps_share = f64::from(lag_counts[2]) / f64::from(total);
     assert_eq!(lag_counts[0], 0);
-    // The rules' probability is 0.2.
+    // By the rules, the puck is observed two steps late with probability 0.2, otherwise one step.
     assert!(
         total > 1000 && (0.16..0.24).contains(&two_steps_share),
         "{lag_counts:?}"

@@ -22,7 +22,7 @@ fn episode_is_the_same_on_any_thread() {
 }
 
 #[test]
-fn saved_episode_continues_with_the_same_bits() {
+fn cloned_episode_continues_with_the_same_bits() {
     for task in AirHockeyTask::ALL {
         let mut original = start_episode(task, AirHockeyProfile::Evaluation);
         for _ in 0..20 {

@@ -116,7 +116,7 @@ fn snapshot(episode: &Episode) -> (Vec<u64>, String) {
 /// Runs all episodes to their ends, at once and each alone, and compares them after each step; returns the reasons of their ends.
 fn compare_with_alone(simd_level: SimdLevel, plays: Vec<EpisodeWithAgent>) -> Vec<EpisodeEnd> {
     let mut ends = vec![];
-    // Each episode twice: one is stepped at once with the others, one alone.
+    // Each episode twice: the first is stepped at once with the others, the second alone.
     let mut pairs: Vec<(EpisodeWithAgent, EpisodeWithAgent)> =
         plays.into_iter().map(|p| (p.clone(), p)).collect();
     while !pairs.is_empty() {
@@ -127,7 +127,7 @@ fn compare_with_alone(simd_level: SimdLevel, plays: Vec<EpisodeWithAgent>) -> Ve
             .zip(&actions)
             .map(|((_, play), action)| play.episode.step(action))
             .collect();
-        // Wrong outcomes, which the step must replace.
+        // The buffer for the outcomes starts with wrong ones, which the step must replace.
         let mut at_once = alone.clone();
         at_once.rotate_left(1);
         let mut episodes: Vec<&mut Episode> = pairs
@@ -135,15 +135,17 @@ fn compare_with_alone(simd_level: SimdLevel, plays: Vec<EpisodeWithAgent>) -> Ve
             .map(|(play, _)| &mut play.episode)
             .collect();
         step_episodes_on(simd_level, &mut episodes, &actions, &mut at_once);
-        for ((stepped, reference), (a, b)) in pairs.iter().zip(at_once.iter().zip(&alone)) {
+        for ((grouped, single), (grouped_outcome, single_outcome)) in
+            pairs.iter().zip(at_once.iter().zip(&alone))
+        {
             let label = format!(
                 "{simd_level:?}, {:?}, step {}",
-                stepped.habit,
-                stepped.episode.steps()
+                grouped.habit,
+                grouped.episode.steps()
             );
-            assert_eq!(a, b, "{label}");
+            assert_eq!(grouped_outcome, single_outcome, "{label}");
             assert!(
-                snapshot(&stepped.episode) == snapshot(&reference.episode),
+                snapshot(&grouped.episode) == snapshot(&single.episode),
                 "{label}"
             );
         }

@@ -52,6 +52,7 @@ fn serving_robot(value: &Value) -> usize {
 fn goals_fouls_and_stuck_pucks_match_the_recording() {
     for case in cases("game_rules") {
         let name = case["name"].as_str().unwrap();
+        // The recording's word for a foul is `fault`.
         let mut referee = Referee::new(serving_robot(&case["start_side_before"]));
         referee.fouls = pair(&case["faults_before"]);
         let score_before = referee.score();
@@ -149,7 +150,7 @@ fn rally_starts_at_rest_on_the_serving_side() {
 }
 
 #[test]
-fn saved_game_continues_with_the_same_bits() {
+fn cloned_game_continues_with_the_same_bits() {
     let mut game = Game::new(setup(Factors::EVALUATION, 2));
     game_hash(&mut game, 700);
     assert_eq!(game_hash(&mut game.clone(), 900), game_hash(&mut game, 900));
@@ -184,6 +185,7 @@ fn observations_are_symmetric_for_both_robots() {
     }
 }
 
+/// A window is 500 steps of a game. Penalty points are counted per window, as they are per episode of a task.
 #[test]
 fn window_counts_a_violation_once() {
     let mut game = Game::new(setup(Factors::NONE, 5));

@@ -20,10 +20,10 @@ enum Habit {
     /// Only one kind of row (position, velocity, acceleration) is large, its sign changing each step;
     /// the others hold.
     OneRow(usize),
-    /// Random signs and powers of ten, including underflow.
+    /// Drawn at random: signs and powers of ten, including underflow. (The variants' names seed the random numbers.)
     Drawn,
     /// Repeatedly twenty steps of rest, and one step with large numbers of alternating sign.
-    Blows,
+    Bursts,
     /// Each number has the sign of its joint's current velocity, so that motion is amplified.
     Amplifying,
 }
@@ -36,7 +36,7 @@ const HABITS: [Habit; 9] = [
     Habit::OneRow(1),
     Habit::OneRow(2),
     Habit::Drawn,
-    Habit::Blows,
+    Habit::Bursts,
     Habit::Amplifying,
 ];
 
@@ -55,7 +55,7 @@ fn action(
     observation: &[f64],
     stream: &mut RandomStream,
 ) -> Vec<f64> {
-    // Joint positions (rad) and velocities (rad/s).
+    // Observed joint positions (rad) and velocities (rad/s).
     let (q, dq) = (&observation[6..13], &observation[13..20]);
     let held: [f64; JOINTS] = std::array::from_fn(|i| q[i]);
     let held = interpolation.hold_position(&held);
@@ -73,8 +73,8 @@ fn action(
                     let sign = if stream.unit() < 0.5 { -1.0 } else { 1.0 };
                     sign * libm::pow(10.0, exponent) * size / ACTION_LIMIT
                 }
-                Habit::Blows if step % 21 == 20 => alternating(i),
-                Habit::Blows => held[i],
+                Habit::Bursts if step % 21 == 20 => alternating(i),
+                Habit::Bursts => held[i],
                 Habit::Amplifying => size.copysign(dq[i % JOINTS]),
             };
             assert!(number.abs() <= ACTION_LIMIT);
@@ -90,8 +90,9 @@ fn assert_finite(label: &str, numbers: &[f64]) {
     );
 }
 
-/// Plays an episode of at most 121 steps, and checks it; returns whether its world diverged.
-fn play_diverges(
+/// Plays an episode of at most 121 steps. Checks that all numbers are finite, and that a divergence ends the episode as the agent's fault.
+/// Returns whether the world diverged.
+fn play_and_check(
     bounds: Bounds,
     plant: &Plant,
     task: AirHockeyTask,
@@ -163,7 +164,7 @@ fn episodes_stay_finite_for_hostile_commands() {
                 for habit in HABITS {
                     // The protocol's limit, and a size near the limits of joint positions and velocities.
                     for size in [ACTION_LIMIT, 30.0] {
-                        if play_diverges(bounds, &plant, task, interpolation, habit, size) {
+                        if play_and_check(bounds, &plant, task, interpolation, habit, size) {
                             diverged += 1;
                         } else {
                             played += 1;

@@ -1,6 +1,6 @@
 //! [`Actor`]: the person, client or process that caused an event.
 
-use super::parse::ParseEventError;
+use super::parse_error::ParseEventError;
 use faceoff_types::{TeamId, UserId};
 use std::{fmt, str::FromStr};
 

@@ -1,6 +1,6 @@
 //! [`Subject`]: the entity that an event concerns, and its stored forms.
 
-use super::parse::ParseEventError;
+use super::parse_error::ParseEventError;
 use faceoff_types::{
     AblationId, AnnouncementId, EvaluationId, GameId, ProposalId, QuestionId, RegistrationId,
     StageDay, StageId, SubmissionId, TeamId, TournamentId, UserId,

@@ -5,12 +5,12 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::{purpose, runs},
+    operations::{job_purpose, runs},
     queries,
     store::Store,
     tables::{
         ablations::{self, Ablation},
-        plan::RunPlan,
+        run_plan::RunPlan,
         runs::Run,
         season,
         submissions::{self, SubmissionState},
@@ -56,7 +56,7 @@ impl Store {
                     seed: SeedLabel::Ablation,
                     keeps_recordings: false,
                 };
-                let job_template = purpose::ABLATION_SHARD;
+                let job_template = job_purpose::ABLATION_SHARD;
                 runs::queue_run(tx, &run, &[submission], job_template, ablated.team).await?;
                 ablations::insert_run(tx, id, run.id).await?;
             }

@@ -4,7 +4,7 @@
 use crate::{
     boxed,
     error::{Result, StoreError},
-    operations::{scrub::check_references, snapshot::copy},
+    operations::{archive_snapshot::copy, scrub_archive::check_references},
     schema::{self, MIGRATIONS},
     store::Store,
     tables::{

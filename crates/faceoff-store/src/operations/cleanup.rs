@@ -1,4 +1,5 @@
-//! Periodic deletion of what is not needed any more: recordings, dropped datasets, bundles that failed validation, and ended credentials.
+//! Periodic deletion of what is not needed any more: recordings, datasets of dropped proposals, bundles that failed validation or have
+//! no submission, and ended credentials.
 
 use crate::{
     boxed,
@@ -24,12 +25,12 @@ pub const PLATFORM_FAILED_BUNDLES_KEPT_FOR: SignedDuration = SignedDuration::fro
 pub const ENDED_CREDENTIALS_KEPT_FOR: SignedDuration = SignedDuration::from_hours(30 * 24);
 
 /// Number of ended credentials that one transaction deletes. Other changes wait for it only briefly.
-const FORGOTTEN_AT_ONCE: u32 = 500;
+const MAX_DELETED_AT_ONCE: u32 = 500;
 
 /// Number of a team's invalid submissions whose logs are kept, the newest ones. A bundle of a few bytes can have a long log.
 pub const INVALID_LOGS_KEPT: u32 = 50;
 
-/// The time this much before `now`: what ended until then is not kept any more.
+/// The instant `kept_for` before `now`. Data that ended then or earlier is deleted.
 pub(super) fn earlier(now: Timestamp, kept_for: SignedDuration) -> Timestamp {
     now.saturating_sub(kept_for).unwrap_or(Timestamp::MIN)
 }
@@ -54,9 +55,9 @@ impl Store {
     /// of runs. To be called periodically; an interrupted call is completed by the next one.
     #[boxed]
     pub async fn remove_old_recordings(&self, now: Timestamp) -> Result<usize> {
-        let ended_before = earlier(now, RECORDINGS_KEPT_FOR);
+        let ended_until = earlier(now, RECORDINGS_KEPT_FOR);
         let mut connection = self.database.read.acquire().await?;
-        let runs_to_clean = runs::with_old_recordings(&mut connection, ended_before).await?;
+        let runs_to_clean = runs::with_old_recordings(&mut connection, ended_until).await?;
         drop(connection);
         for run in &runs_to_clean {
             self.artifacts().delete_folder(&recordings_of(*run)).await?;
@@ -72,9 +73,9 @@ impl Store {
     /// [`RECORDINGS_KEPT_FOR`] ago; their results stay readable. Returns the number of datasets. An interrupted call is completed by the next one.
     #[boxed]
     pub async fn remove_dropped_datasets(&self, now: Timestamp) -> Result<usize> {
-        let ended_before = earlier(now, RECORDINGS_KEPT_FOR);
+        let ended_until = earlier(now, RECORDINGS_KEPT_FOR);
         let mut connection = self.database.read.acquire().await?;
-        let dropped = retentions::dropped_with_datasets(&mut connection, ended_before).await?;
+        let dropped = retentions::dropped_with_datasets(&mut connection, ended_until).await?;
         drop(connection);
         for (id, key) in &dropped {
             self.artifacts().delete_dataset(key).await?;
@@ -92,16 +93,16 @@ impl Store {
     /// Returns the number of bundles. An interrupted call is completed by the next one.
     #[boxed]
     pub async fn remove_failed_bundles(&self, now: Timestamp) -> Result<usize> {
-        let ended_before = earlier(now, PLATFORM_FAILED_BUNDLES_KEPT_FOR);
+        let ended_until = earlier(now, PLATFORM_FAILED_BUNDLES_KEPT_FOR);
         let mut connection = self.database.read.acquire().await?;
-        let failed = bundles::with_failed_validation(&mut connection, ended_before).await?;
+        let failed = bundles::with_failed_validation(&mut connection, ended_until).await?;
         drop(connection);
         for (id, key) in &failed {
             self.artifacts().delete(key).await?;
             self.write(Actor::Server, now, async |tx| {
                 bundles::set_failed_removed(tx, *id, now).await?;
                 submissions::share_log(tx, *id).await?;
-                submissions::forget_old_logs(tx, *id, INVALID_LOGS_KEPT).await
+                submissions::empty_old_logs(tx, *id, INVALID_LOGS_KEPT).await
             })
             .await?;
         }
@@ -112,13 +113,15 @@ impl Store {
     /// they say who invited whom. Returns the number of deleted rows. An interrupted call is completed by the next one.
     #[boxed]
     pub async fn delete_ended_credentials(&self, now: Timestamp) -> Result<usize> {
-        let ended_before = earlier(now, ENDED_CREDENTIALS_KEPT_FOR);
+        let ended_until = earlier(now, ENDED_CREDENTIALS_KEPT_FOR);
         let mut total = 0;
         loop {
-            let deleted = self.write(Actor::Server, now, async |tx| {
-                let tokens = tokens::forget_ended(tx, ended_before, FORGOTTEN_AT_ONCE).await?;
-                Ok(tokens + invitations::forget_ended(tx, ended_before, FORGOTTEN_AT_ONCE).await?)
-            });
+            let deleted =
+                self.write(Actor::Server, now, async |tx| {
+                    let tokens = tokens::delete_ended(tx, ended_until, MAX_DELETED_AT_ONCE).await?;
+                    Ok(tokens
+                        + invitations::delete_ended(tx, ended_until, MAX_DELETED_AT_ONCE).await?)
+                });
             match deleted.await? {
                 0 => return Ok(total),
                 deleted => total += deleted,

@@ -17,15 +17,15 @@ use crate::{
 use faceoff_types::{TokenId, UserId};
 use std::collections::{BTreeMap, HashSet};
 
-/// What ended with a user's rights or a token, and what did not.
+/// Credentials that were revoked because a user lost access or a token was revoked, and accounts that came from them and stay.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct EndedCredentials {
     pub tokens: Vec<Token>,
     pub invitations: Vec<Invitation>,
     pub webhooks: Vec<Webhook>,
-    /// The users who joined by the invitations, or by those of such users: their accounts stay.
+    /// The active users who joined by invitations of the creator, or by those of such users: their accounts stay.
     pub remaining_users: Vec<User>,
-    /// The users who got access again by the links: their new passwords and tokens stay.
+    /// The active users who got access again by links of the creator: their new passwords and tokens stay.
     pub restored_users: Vec<User>,
 }
 
@@ -107,7 +107,7 @@ async fn revoke_created(
 async fn restored_by(tx: &mut Tx, creators: &[Creator]) -> Result<Vec<User>> {
     let mut found = BTreeMap::new();
     for creator in creators {
-        for user in users::invited(tx, *creator, true).await? {
+        for user in users::restored_by(tx, *creator).await? {
             let is_creator = creators.iter().any(|creator| creator.user == Some(user.id));
             if user.left_at.is_none() && !is_creator {
                 found.insert(user.name.to_string(), user);
@@ -122,7 +122,7 @@ async fn joined_by(tx: &mut Tx, mut creators: Vec<Creator>) -> Result<Vec<User>>
     let mut visited: HashSet<UserId> = creators.iter().filter_map(|creator| creator.user).collect();
     let mut found = BTreeMap::new();
     while let Some(creator) = creators.pop() {
-        for user in users::invited(tx, creator, false).await? {
+        for user in users::joined_by(tx, creator).await? {
             if !visited.insert(user.id) {
                 continue;
             }

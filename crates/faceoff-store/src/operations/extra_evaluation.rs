@@ -15,7 +15,7 @@ use crate::{
     tables::{
         counting_evaluations, days, evaluation_specs,
         evaluations::Evaluation,
-        plan::RunPlan,
+        run_plan::RunPlan,
         season, stage_runtimes,
         stages::{self, Stage},
         submissions, teams,

@@ -5,8 +5,8 @@ use crate::{
     error::Result,
     event::Actor,
     operations::{
+        job_purpose::{self, JobPurpose},
         lease_release::event_subject,
-        purpose::{self, Purpose},
     },
     queue::{self, JobClaim},
     store::Store,
@@ -30,7 +30,7 @@ impl Store {
             let Some(kind) = queue::renew(tx, claim, episodes_done, lease_s, now).await? else {
                 return Ok(false);
             };
-            let purpose = purpose::of_job(tx, claim.job, &kind).await?;
+            let purpose = job_purpose::of_job(tx, claim.job, &kind).await?;
             let subject = event_subject(tx, &purpose).await?;
             tx.record_progress(subject);
             Ok(true)
@@ -57,7 +57,7 @@ impl Store {
             let Some(kind) = queue::renew(tx, claim, 0, lease_s, now).await? else {
                 return Ok(false);
             };
-            if let Purpose::Game(id) = purpose::of_job(tx, claim.job, &kind).await? {
+            if let JobPurpose::Game(id) = job_purpose::of_job(tx, claim.job, &kind).await? {
                 game_attempts::transfer(tx, id, new_holder).await?;
             }
             Ok(true)

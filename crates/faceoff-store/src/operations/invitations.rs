@@ -67,7 +67,7 @@ pub struct JoinOutcome {
     /// The user's team; `None` for an organiser.
     pub team: Option<Team>,
     pub token: Token,
-    /// The credentials that ended because the user got access again: those that the user had created before.
+    /// The credentials that were revoked because the user got access again: those that the user had created before.
     pub ended: EndedCredentials,
 }
 
@@ -195,7 +195,7 @@ async fn add_user(tx: &mut Tx, request: &mut JoinRequest, team: Option<TeamId>) 
     Ok(id)
 }
 
-/// Gives a user access again: all earlier tokens and sessions are revoked, and all that the user has made ends.
+/// Gives a user access again: all earlier tokens and sessions are revoked, and so are the credentials that the user has created.
 async fn restore_access(
     tx: &mut Tx,
     id: UserId,
@@ -257,7 +257,7 @@ async fn join(tx: &mut Tx, mut request: JoinRequest) -> Result<JoinOutcome> {
             add_user(tx, &mut request, team).await?
         }
         InvitationRole::PasswordReset(user) => {
-            // Before all that the user has made ends, which may include this link.
+            // Before the user's own credentials are revoked, which may include this link.
             invitations::set_accepted(tx, invitation.id, user, now).await?;
             ended = restore_access(tx, user, &request).await?;
             user

@@ -4,7 +4,7 @@
 use crate::{
     operations::runs::RunOwner,
     queue::JobClaim,
-    tables::{plan::RunPlan, runs::Run, shards::Shard, submissions::Submission},
+    tables::{run_plan::RunPlan, runs::Run, shards::Shard, submissions::Submission},
 };
 use faceoff_types::{
     BundleRef, EvaluationId, GameId, Ruleset, Seed, StageRuntimes, TournamentRules,
@@ -55,6 +55,7 @@ pub enum Job {
         attempt: u32,
         /// Earlier attempts that ended by a platform fault.
         platform_retries: u32,
+        /// False for a game of a repeated schedule, of which only the result is stored.
         keeps_recording: bool,
     },
     /// Join the recordings of an evaluation whose shards are all committed, and score it.
@@ -73,7 +74,7 @@ pub enum Job {
 /// Seeds of a job's episodes, derived from the season's secret, which stays in the store.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RunSeeds {
-    /// Seed of the episodes: that of the day, of ablations, or of a validation run.
+    /// Seed of the episodes: that of a day, an ablation, a validation run or a game.
     pub episodes: Seed,
     /// Seed of the season's model mismatch: the deviation of the simulated robot from the model that teams get.
     pub mismatch: Seed,

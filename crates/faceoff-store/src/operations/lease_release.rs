@@ -1,17 +1,17 @@
 //! Release of leases: a job that a worker does not complete returns to the queue, or is given up. Failures by a platform
-//! fault (a fault of the server or a worker, not of the agent) are counted; other releases are not.
+//! fault (a fault of the server or a worker, not of the agent) are counted. Other releases do not count as attempts.
 
 use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
-        completion::{self, RunEnd},
-        purpose::{self, Purpose},
+        job_purpose::{self, JobPurpose},
+        run_completion::{self, RunEnd},
         runs,
         tournament::game_lifecycle,
     },
-    queue::{self, ClaimState, JobClaim},
+    queue::{self, ClaimState, JobClaim, ReleaseCause},
     store::Store,
     tables::{evaluations::Failure, game_attempts::AttemptOutcome, submissions},
     write::Tx,
@@ -30,21 +30,21 @@ const FULL_DISK_DELAY_S: u32 = 10;
 /// The subject of a job's events.
 pub(crate) async fn event_subject(
     connection: &mut SqliteConnection,
-    purpose: &Purpose,
+    purpose: &JobPurpose,
 ) -> Result<Subject> {
     Ok(match purpose {
-        Purpose::Validation(id) => Subject::Submission(*id),
-        Purpose::Game(id) => Subject::Game(*id),
-        Purpose::Shard { run, .. } => runs::find_owner(connection, *run).await?.subject(),
-        Purpose::Scoring(evaluation) => evaluation.owner().subject(),
+        JobPurpose::Validation(id) => Subject::Submission(*id),
+        JobPurpose::Game(id) => Subject::Game(*id),
+        JobPurpose::Shard { run, .. } => runs::find_owner(connection, *run).await?.subject(),
+        JobPurpose::Scoring(evaluation) => evaluation.owner().subject(),
     })
 }
 
-/// Drops a job after platform faults, and ends the submission, run or game that it belongs to.
+/// Drops a job after platform faults, and ends what it belongs to: a validation run, a run, a scoring or a game.
 pub(crate) async fn give_up(tx: &mut Tx, job: Uuid, stored_kind: &str, reason: &str) -> Result<()> {
     queue::drop_jobs(tx, &[job]).await?;
-    match purpose::of_job(tx, job, stored_kind).await {
-        Ok(Purpose::Validation(id)) => {
+    match job_purpose::of_job(tx, job, stored_kind).await {
+        Ok(JobPurpose::Validation(id)) => {
             submissions::set_validation_error(tx, id, reason).await?;
             let reason = reason.to_owned();
             tx.record(
@@ -53,13 +53,13 @@ pub(crate) async fn give_up(tx: &mut Tx, job: Uuid, stored_kind: &str, reason: &
             );
             Ok(())
         }
-        Ok(Purpose::Game(id)) => game_lifecycle::give_up(tx, id, reason).await,
-        Ok(Purpose::Shard { run, .. }) => {
+        Ok(JobPurpose::Game(id)) => game_lifecycle::give_up(tx, id, reason).await,
+        Ok(JobPurpose::Shard { run, .. }) => {
             let owner = runs::find_owner(tx, run).await?;
-            completion::end_run(tx, run, owner, RunEnd::PlatformFailed(reason)).await
+            run_completion::end_run(tx, run, owner, RunEnd::PlatformFailed(reason)).await
         }
-        Ok(Purpose::Scoring(evaluation)) => {
-            completion::fail_evaluation(tx, evaluation.id, Failure::Platform(reason)).await
+        Ok(JobPurpose::Scoring(evaluation)) => {
+            run_completion::fail_evaluation(tx, evaluation.id, Failure::Platform(reason)).await
         }
         // No row refers to the job, so there is nothing to end.
         Err(StoreError::Damaged(_)) => Ok(()),
@@ -73,11 +73,11 @@ async fn requeue_leased(
     claim: &JobClaim,
     kind: &str,
     delay_s: u32,
-    out_of_space: bool,
+    cause: ReleaseCause,
 ) -> Result<()> {
-    queue::release(tx, claim, delay_s, out_of_space).await?;
-    let purpose = purpose::of_job(tx, claim.job, kind).await?;
-    if let Purpose::Game(id) = purpose {
+    queue::release(tx, claim, delay_s, cause).await?;
+    let purpose = job_purpose::of_job(tx, claim.job, kind).await?;
+    if let JobPurpose::Game(id) = purpose {
         game_lifecycle::end_attempt(tx, id, AttemptOutcome::Released, None).await?;
     }
     let subject = event_subject(tx, &purpose).await?;
@@ -90,7 +90,7 @@ async fn requeue_leased(
 pub(crate) async fn requeue_leases_of(tx: &mut Tx, holder: &str) -> Result<u64> {
     let leases = queue::leases(tx, holder).await?;
     for (claim, kind) in &leases {
-        requeue_leased(tx, claim, kind, 0, false).await?;
+        requeue_leased(tx, claim, kind, 0, ReleaseCause::Interrupted).await?;
     }
     Ok(u64::try_from(leases.len()).unwrap_or(u64::MAX))
 }
@@ -114,7 +114,7 @@ impl Store {
             let ClaimState::Leased { kind } = queue::claim_state(tx, claim).await? else {
                 return Ok(());
             };
-            let purpose = purpose::of_job(tx, claim.job, &kind).await?;
+            let purpose = job_purpose::of_job(tx, claim.job, &kind).await?;
             let failures = queue::requeue_failed(tx, claim, now).await?;
             let event = Event::JobFailed {
                 job: claim.job,
@@ -123,7 +123,7 @@ impl Store {
             };
             let subject = event_subject(tx, &purpose).await?;
             tx.record(subject, event);
-            if let Purpose::Game(id) = purpose {
+            if let JobPurpose::Game(id) = purpose {
                 game_lifecycle::end_attempt(tx, id, AttemptOutcome::PlatformFailed, Some(reason))
                     .await?;
             }
@@ -139,7 +139,8 @@ impl Store {
     /// recorded.
     #[boxed]
     pub async fn release(&self, claim: &JobClaim, now: Timestamp) -> Result<()> {
-        self.release_after(claim, 0, false, now).await
+        self.release_after(claim, 0, ReleaseCause::Interrupted, now)
+            .await
     }
 
     /// Releases a job that was leased in advance and not started, if `claim.holder` still holds the lease. False if another
@@ -154,7 +155,7 @@ impl Store {
             if !queue::is_holder(tx, claim).await? {
                 return Ok(false);
             }
-            requeue_leased(tx, claim, &kind, 0, false).await?;
+            requeue_leased(tx, claim, &kind, 0, ReleaseCause::Interrupted).await?;
             Ok(true)
         })
         .await
@@ -165,8 +166,12 @@ impl Store {
     /// run out of space on a disk with enough free space.
     #[boxed]
     pub async fn release_disk_full(&self, claim: &JobClaim, now: Timestamp) -> Result<()> {
-        let out_of_space = !self.free_space.is_short();
-        self.release_after(claim, FULL_DISK_DELAY_S, out_of_space, now)
+        let cause = if self.free_space.is_short() {
+            ReleaseCause::Interrupted
+        } else {
+            ReleaseCause::OutOfSpace
+        };
+        self.release_after(claim, FULL_DISK_DELAY_S, cause, now)
             .await
     }
 
@@ -184,14 +189,14 @@ impl Store {
         &self,
         claim: &JobClaim,
         delay_s: u32,
-        out_of_space: bool,
+        cause: ReleaseCause,
         now: Timestamp,
     ) -> Result<()> {
         let actor = Actor::Worker(claim.holder.clone());
         self.write(actor, now, async |tx| {
             match queue::claim_state(tx, claim).await? {
                 ClaimState::Leased { kind } => {
-                    requeue_leased(tx, claim, &kind, delay_s, out_of_space).await
+                    requeue_leased(tx, claim, &kind, delay_s, cause).await
                 }
                 ClaimState::AlreadyDone | ClaimState::Lost => Ok(()),
             }

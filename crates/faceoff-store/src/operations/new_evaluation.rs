@@ -3,12 +3,12 @@
 use crate::{
     error::Result,
     event::{Event, Subject},
-    operations::{purpose, runs},
+    operations::{job_purpose, runs},
     queue::NewJob,
     tables::{
         days,
         evaluation_specs::{self, EvaluationSpec},
-        plan::RunPlan,
+        run_plan::RunPlan,
         runs::Run,
     },
     write::Tx,
@@ -58,7 +58,7 @@ pub(crate) async fn queue_evaluation(
     let job = NewJob {
         delay_s,
         batch: queued_as_of.as_millisecond(),
-        ..purpose::SHARD
+        ..job_purpose::SHARD
     };
     runs::queue_run(tx, &run, &[requested.submission], job, requested.team).await?;
     let spec = EvaluationSpec {

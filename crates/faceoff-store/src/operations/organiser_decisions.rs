@@ -6,7 +6,7 @@ use crate::{
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
-        completion,
+        run_completion,
         tournament::entrants::{DepartureRequest, remove_entrant},
     },
     queries,
@@ -111,7 +111,7 @@ impl Store {
             for evaluation in counting_evaluations::of_day(tx, stage_day, None).await? {
                 if evaluation.is_open {
                     let cancelled = Failure::Cancelled(reason);
-                    completion::fail_evaluation(tx, evaluation.id, cancelled).await?;
+                    run_completion::fail_evaluation(tx, evaluation.id, cancelled).await?;
                 } else if evaluation.counts {
                     void(tx, evaluation.id, reason).await?;
                 } else {
@@ -151,7 +151,7 @@ impl Store {
             let cancellation_reason = format!("the team is disqualified: {reason}");
             for evaluation in counting_evaluations::open_of_team(tx, id).await? {
                 let cancelled = Failure::Cancelled(&cancellation_reason);
-                completion::fail_evaluation(tx, evaluation, cancelled).await?;
+                run_completion::fail_evaluation(tx, evaluation, cancelled).await?;
             }
             disqualify_from_tournaments(tx, id, &cancellation_reason).await?;
             let reason = decision.reason;

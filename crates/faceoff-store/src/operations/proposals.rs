@@ -5,17 +5,16 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::{completion, organiser_decisions::void, purpose, runs},
+    operations::{job_purpose, organiser_decisions::void, run_completion, runs},
     queries,
     queue::NewJob,
     store::Store,
     tables::{
-        counting_evaluations, days,
+        board_freezes, counting_evaluations, days,
         evaluation_specs::{self, EvaluationSpec},
         evaluations::{self, EvaluationState, Failure, ProposedEvaluation},
-        freezes,
-        plan::RunPlan,
         proposals::{self, Proposal, ProposalKind, ProposalOutcome},
+        run_plan::RunPlan,
         runs as run_rows,
         runs::Run,
         season, sign_offs, stage_runtimes,
@@ -41,7 +40,7 @@ pub enum Reevaluation {
     DayWithNewestRules(StageDay),
 }
 
-/// One evaluation of a proposal, before it is queued.
+/// One evaluation of a proposal, before it is queued. `replaces` is the evaluation that it repeats.
 struct ProposedRun {
     submission: SubmissionId,
     team: TeamId,
@@ -56,7 +55,7 @@ async fn add_proposal(tx: &mut Tx, proposal: &Proposal, proposed: Vec<ProposedRu
     proposals::insert(tx, proposal).await?;
     let job = NewJob {
         batch: tx.now.as_millisecond(),
-        ..purpose::PROPOSAL_SHARD
+        ..job_purpose::PROPOSAL_SHARD
     };
     let count = u32::try_from(proposed.len()).unwrap_or(u32::MAX);
     for proposed_run in proposed {
@@ -94,7 +93,7 @@ async fn reevaluation_runs(
     }
     let has_newest_rules =
         |spec: &EvaluationSpec| newest.is_some_and(|stage| stage.rules.number == spec.revision);
-    let done_teams: HashSet<TeamId> = all
+    let teams_with_newest_rules: HashSet<TeamId> = all
         .iter()
         .filter(|spec| has_newest_rules(spec))
         .map(|spec| spec.team)
@@ -102,7 +101,7 @@ async fn reevaluation_runs(
     let mut proposed = Vec::new();
     for spec in all
         .into_iter()
-        .filter(|spec| !done_teams.contains(&spec.team))
+        .filter(|spec| !teams_with_newest_rules.contains(&spec.team))
     {
         let submission = submissions::find(tx, spec.submission).await?;
         // In a proposal for several teams, a submission with a deleted bundle is left out. A proposal for this submission
@@ -295,7 +294,7 @@ impl Store {
                     "{open} of its evaluations are queued or running: wait for their end"
                 ));
             }
-            if let Some(frozen) = freezes::find(tx, proposal.stage).await? {
+            if let Some(frozen) = board_freezes::find(tx, proposal.stage).await? {
                 return StoreError::conflict(format!(
                     "the boards of the stage are frozen since {}: unfreeze them first",
                     frozen.at
@@ -329,7 +328,7 @@ impl Store {
             for evaluation in queries::proposals::evaluations_of_proposal(tx, id).await? {
                 if !evaluation.state.is_over() {
                     let failure = Failure::Cancelled("the proposal was dropped");
-                    completion::fail_evaluation(tx, evaluation.id, failure).await?;
+                    run_completion::fail_evaluation(tx, evaluation.id, failure).await?;
                 }
             }
             proposals::set_outcome(tx, id, ProposalOutcome::Dropped(now)).await?;

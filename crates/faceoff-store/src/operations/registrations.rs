@@ -75,6 +75,7 @@ impl Store {
                 None => None,
             };
             teams::check_name(tx, None, &new.team_name).await?;
+            // Names with the same skeleton look alike.
             let skeleton = name_skeleton(new.team_name.as_str());
             let pending = registrations::pending_names(tx).await?;
             if let Some(name) = pending

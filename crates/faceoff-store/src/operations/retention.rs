@@ -64,12 +64,13 @@ fn sign_off_period_end(retention: &Retention, stage: &Stage) -> Option<Timestamp
     signed_off_at.saturating_add(period).ok()
 }
 
-/// Is the period over for which the retention keeps the stage's files?
-fn has_ended(retention: &Retention, stage: &Stage, is_over: bool, now: Timestamp) -> bool {
+/// Is the period over for which the retention keeps the stage's files? A retention until a date keeps them also while the stage is
+/// not over.
+fn has_ended(retention: &Retention, stage: &Stage, is_stage_over: bool, now: Timestamp) -> bool {
     let is_date_past = retention.until.is_some_and(|until| until <= now);
     let is_sign_off_period_past =
         sign_off_period_end(retention, stage).is_some_and(|end| end <= now);
-    is_date_past && is_over || is_sign_off_period_past
+    is_date_past && is_stage_over || is_sign_off_period_past
 }
 
 /// Are all files of a stage still needed? Results can change while evaluations, days or proposals are open,
@@ -97,13 +98,13 @@ fn older_than_newest(evaluations: &[ScoredEvaluation], kept_count: u32) -> Vec<&
                 .get(&evaluation.revision)
                 .is_some_and(|best| best.id == evaluation.id)
     };
-    let mut newer = 0;
+    let mut newer_counting = 0;
     let mut older = Vec::new();
     for evaluation in evaluations {
-        if newer >= kept_count && !is_best(evaluation) {
+        if newer_counting >= kept_count && !is_best(evaluation) {
             older.push(evaluation);
         }
-        newer += u32::from(evaluation.counts);
+        newer_counting += u32::from(evaluation.counts);
     }
     older
 }
@@ -118,9 +119,9 @@ async fn plan_removal(
     if retention.keeps_all() {
         return Ok(RemovalPlan::default());
     }
-    let is_over = stage.phase(now) == StagePhase::Closed
+    let is_stage_over = stage.phase(now) == StagePhase::Closed
         || season::read(connection).await?.closed_at.is_some();
-    let ended = has_ended(retention, stage, is_over, now);
+    let ended = has_ended(retention, stage, is_stage_over, now);
     let scored = retentions::scored_evaluations(connection, stage.id).await?;
     let removable: Vec<&ScoredEvaluation> = match retention.last {
         _ if ended => scored.iter().collect(),
@@ -202,15 +203,15 @@ impl Store {
         let immediate = plan_removal(&mut connection, &stage, retention, now)
             .await?
             .removed;
-        let dates = [retention.until, sign_off_period_end(retention, &stage)];
-        let Some(next_date) = dates.into_iter().flatten().filter(|at| *at > now).min() else {
+        let end_dates = [retention.until, sign_off_period_end(retention, &stage)];
+        let Some(next_date) = end_dates.into_iter().flatten().filter(|at| *at > now).min() else {
             return Ok(immediate);
         };
-        let eventual = plan_removal(&mut connection, &stage, retention, next_date).await?;
-        let next_removal_at = (eventual.removed != immediate).then_some(next_date);
+        let at_next_date = plan_removal(&mut connection, &stage, retention, next_date).await?;
+        let next_removal_at = (at_next_date.removed != immediate).then_some(next_date);
         Ok(RemovalSummary {
             next_removal_at,
-            ..eventual.removed
+            ..at_next_date.removed
         })
     }
 
@@ -253,10 +254,10 @@ impl Store {
     /// request. Evidence is kept. Returns the number of deleted files.
     #[boxed]
     pub async fn remove_files_of_removed(&self, now: Timestamp) -> Result<usize> {
-        let removed_before = earlier(now, FILES_KEPT_FOR);
+        let removed_until = earlier(now, FILES_KEPT_FOR);
         let mut connection = self.database.read.acquire().await?;
-        let datasets = retentions::deletable_datasets(&mut connection, removed_before).await?;
-        let bundles = bundles::deletable(&mut connection, removed_before).await?;
+        let datasets = retentions::deletable_datasets(&mut connection, removed_until).await?;
+        let bundles = bundles::deletable(&mut connection, removed_until).await?;
         drop(connection);
         for (id, key) in &datasets {
             self.artifacts().delete_dataset(key).await?;

@@ -88,7 +88,8 @@ pub(crate) async fn queue_run(
     }
     runs::insert(tx, run, contestants).await?;
     let account = queue::open_account(tx, job.lane, &team.to_string()).await?;
-    let mut parts = Vec::new();
+    // Each with its random place in the order of play, and its position in the run.
+    let mut drawn_shards = Vec::new();
     for task in run.plan.tasks.iter().copied() {
         let mut first_episode = 0;
         while first_episode < run.plan.episodes_per_task {
@@ -103,12 +104,12 @@ pub(crate) async fn queue_run(
                 end_episode,
                 recording: None,
             };
-            parts.push((random_number()?, parts.len(), shard));
+            drawn_shards.push((random_number()?, drawn_shards.len(), shard));
             first_episode = end_episode;
         }
     }
-    parts.sort_unstable_by_key(|(order, ..)| *order);
-    for (_, position, shard) in parts {
+    drawn_shards.sort_unstable_by_key(|(place, ..)| *place);
+    for (_, position, shard) in drawn_shards {
         let job_id = queue::insert(tx, job, account).await?;
         let position = u32::try_from(position).unwrap_or(u32::MAX);
         shards::insert(tx, run.id, &shard, position, job_id).await?;
@@ -116,7 +117,7 @@ pub(crate) async fn queue_run(
     Ok(())
 }
 
-/// A place in the order of play.
+/// A random place in the order of play.
 fn random_number() -> Result<u64> {
     getrandom::u64()
         .map_err(|error| StoreError::Database(sqlx::Error::Io(std::io::Error::other(error))))

@@ -1,4 +1,4 @@
-//! Name and end of the season.
+//! The season as a whole: its name, its competition, and its closing.
 
 use crate::{
     boxed,
@@ -38,7 +38,7 @@ impl Store {
                 competition.id
             ))),
             Some((_, bound_hash)) if bound_hash == hash => Ok(()),
-            // An archive is not written.
+            // The hash is not updated in an imported archive, which is read-only.
             _ if self.archived_season().is_some() => Ok(()),
             _ => {
                 self.write(Actor::Server, now, async |tx| {

@@ -8,8 +8,9 @@ use crate::{
     operations::start_day::{self, CutoffDate},
     store::Store,
     tables::{
+        board_freezes,
         evaluations::Evaluation,
-        freezes, proposals, season, sign_offs,
+        proposals, season, sign_offs,
         stages::{self, Stage, StagePhase},
     },
     write::Tx,
@@ -61,20 +62,21 @@ async fn check_ready_for_sign_off(tx: &mut Tx, stage: &Stage) -> Result<()> {
             stage.name.as_str()
         ));
     }
-    if let Some(frozen) = freezes::find(tx, stage.id).await? {
+    if let Some(frozen) = board_freezes::find(tx, stage.id).await? {
         return StoreError::conflict(format!(
             "the boards of the stage {:?} are frozen since {}: unfreeze them first",
             stage.name.as_str(),
             frozen.at
         ));
     }
-    let proposals = proposals::all(tx).await?.into_iter();
-    let proposals =
-        proposals.filter(|proposal| proposal.stage == stage.id && proposal.outcome.is_none());
-    let proposals = proposals.count();
-    if proposals > 0 {
+    let undecided_count = proposals::all(tx)
+        .await?
+        .into_iter()
+        .filter(|proposal| proposal.stage == stage.id && proposal.outcome.is_none())
+        .count();
+    if undecided_count > 0 {
         return StoreError::conflict(format!(
-            "{proposals} trials or proposed re-evaluations of the stage {:?} are pending: apply or drop them first",
+            "{undecided_count} trials or proposed re-evaluations of the stage {:?} are pending: apply or drop them first",
             stage.name.as_str()
         ));
     }

@@ -5,7 +5,7 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::{deadlines, retention},
+    operations::{day_deadlines, retention},
     store::Store,
     tables::{
         days, season, sign_offs,
@@ -206,7 +206,8 @@ async fn change(
     changed.configured = stage.configured && !is_manual;
     stages::update(tx, &changed).await?;
     if changed.settings != stage.settings {
-        deadlines::update_deadlines(tx, &changed, source == ChangeSource::Configuration).await?;
+        day_deadlines::update_deadlines(tx, &changed, source == ChangeSource::Configuration)
+            .await?;
     }
     set_rules(tx, &changed, rules).await
 }

@@ -42,8 +42,9 @@ impl Store {
         users::find_with_password(&mut *self.database.read.acquire().await?, name).await
     }
 
-    /// Sets a user's password, given as a PHC string (a hash with its parameters). All tokens and sessions of the user are revoked, and, if
-    /// the user had a password before, all that the user has made ends, except `used_token`, which authenticated this request.
+    /// Sets a user's password, given as a PHC string (a hash with its parameters). All tokens and sessions of the user are revoked
+    /// except `used_token`, which authenticated this request. If the user had a password before, the credentials (tokens,
+    /// invitations, webhooks) that the user has created are revoked, too.
     #[boxed]
     pub async fn set_password(
         &self,
@@ -100,7 +101,8 @@ impl Store {
         .await
     }
 
-    /// Removes a user: all tokens and sessions are revoked at once, and all that the user has made ends. The name stays in the log.
+    /// Removes a user: all tokens and sessions are revoked at once, and so are the credentials (tokens, invitations, webhooks) that
+    /// the user has created. The name stays in the log.
     /// [`StoreError::Conflict`] if the user has left, or if no one could organise the season afterwards: there is no other
     /// organiser and no valid token of the operator.
     #[boxed]

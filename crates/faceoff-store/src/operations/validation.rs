@@ -5,8 +5,8 @@ use crate::{
     error::Result,
     event::{Event, Subject},
     operations::{
-        commit::{CommitOutcome, wrong_job},
-        purpose::Purpose,
+        commit_job::{CommitOutcome, wrong_job},
+        job_purpose::JobPurpose,
     },
     queue::JobClaim,
     store::Store,
@@ -29,7 +29,7 @@ impl Store {
         now: Timestamp,
     ) -> Result<CommitOutcome> {
         self.commit(claim, now, async |tx, purpose| {
-            let Purpose::Validation(id) = purpose else {
+            let JobPurpose::Validation(id) = purpose else {
                 return Err(wrong_job("validation run", &purpose));
             };
             let subject = Subject::Submission(id);

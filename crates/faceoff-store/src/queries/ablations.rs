@@ -6,7 +6,7 @@ use crate::{
     store::Store,
     tables::{
         ablations::{self, Ablation, AblationRow, AblationState},
-        progress::{self, RunProgress},
+        run_progress::{self, RunProgress},
         runs,
     },
 };
@@ -37,7 +37,10 @@ async fn from_row(connection: &mut SqliteConnection, row: AblationRow) -> Result
         (None, _) => {
             let runs: Vec<_> = run_by_profile.values().copied().collect();
             let mut progress = RunProgress::default();
-            for run in progress::of_runs(connection, &runs).await?.into_values() {
+            for run in run_progress::of_runs(connection, &runs)
+                .await?
+                .into_values()
+            {
                 progress.add(run);
             }
             AblationState::Unfinished {

@@ -120,7 +120,7 @@ pub struct BoardScope {
     pub finished_until: Option<Timestamp>,
     /// Evaluations of later days are left out; `None`: no limit.
     pub last_day: Option<Date>,
-    /// These evaluations are left out.
+    /// These evaluations are left out, for a preview of the board without them.
     pub excluded: Vec<EvaluationId>,
 }
 

@@ -6,7 +6,7 @@ use crate::{
     store::Store,
     tables::{
         evaluations::{self, Evaluation, EvaluationRow},
-        progress::{self, RunProgress},
+        run_progress::{self, RunProgress},
     },
 };
 use faceoff_types::{EvaluationId, StageDay, TeamId};
@@ -20,7 +20,7 @@ pub(super) async fn with_progress_by<T>(
     convert: fn(EvaluationRow, RunProgress) -> Result<T>,
 ) -> Result<Vec<T>> {
     let running: Vec<_> = rows.iter().filter_map(EvaluationRow::open_run).collect();
-    let mut by_run = progress::of_runs(connection, &running).await?;
+    let mut by_run = run_progress::of_runs(connection, &running).await?;
     rows.into_iter()
         .map(|row| {
             let run = row.open_run();

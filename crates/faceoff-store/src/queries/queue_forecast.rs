@@ -72,10 +72,12 @@ pub struct EvaluationBacklog {
 
 /// An open job with its purpose.
 struct OpenJob {
+    /// Number of its account.
     account: i64,
     /// Jobs of a smaller batch come first within a lane; within a batch and account, those with a smaller `queue_no`. The batch is the
     /// time of the cutoff or request in milliseconds, the matchday or replay number of a game, or 0.
     batch: i64,
+    /// Rises with every queued job.
     queue_no: i64,
     is_leased: bool,
     /// For a leased job: when its lease expires.
@@ -86,13 +88,15 @@ struct OpenJob {
     urgency: u32,
     /// Number of episodes of a shard.
     episodes: Option<u32>,
-    /// Owner of the account: a team, a tournament, or empty for the platform.
+    /// Owner of the account: a team, a tournament, or empty for the platform. Not a lease holder.
     holder: String,
     run: Option<RunId>,
     validation_of: Option<SubmissionId>,
     scoring_of: Option<EvaluationId>,
     game: Option<GameId>,
+    /// Length of a game by the tournament's rules, in control steps.
     game_steps: Option<u32>,
+    /// Is the game's tournament paused?
     is_paused: bool,
 }
 

@@ -1,6 +1,6 @@
 //! Queries of runs: their shards (parts of the episodes), outcomes and agent faults.
 
-use crate::tables::plan::RunPlan;
+use crate::tables::run_plan::RunPlan;
 use crate::{
     boxed,
     error::{Result, StoreError},

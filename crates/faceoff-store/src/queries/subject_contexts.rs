@@ -34,7 +34,7 @@ pub enum SubjectContext {
         submission: SubmissionId,
         team: TeamId,
     },
-    /// A regular evaluation, not one of a trial or a proposal.
+    /// An evaluation of a day, not one of a trial or a proposed re-evaluation.
     Evaluation {
         stage: StageId,
         day: Date,

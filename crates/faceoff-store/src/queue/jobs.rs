@@ -42,8 +42,8 @@ pub(crate) async fn insert(tx: &mut Tx, job: NewJob, account: SlotTimeAccount) -
     Ok(id)
 }
 
-/// Wakes idle workers: waiting jobs can be claimed again.
-pub(crate) const fn resume(tx: &mut Tx) {
+/// Wakes idle workers after a pause: waiting jobs can be claimed again.
+pub(crate) const fn wake_workers(tx: &mut Tx) {
     tx.job_added();
 }
 

@@ -234,21 +234,30 @@ pub(crate) async fn renew_all_leases(
     Ok(())
 }
 
-/// Queues a leased job again, to be claimed after a delay. Neither the attempt nor its slot time counts. With
-/// `out_of_space`, the release itself is counted: the job ran out of disk space although the required minimum was free.
+/// Why a leased job returns to the queue without having failed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ReleaseCause {
+    /// A cause outside of the job: a shutdown, a ban of its worker, or a disk with less than the required minimum free.
+    Interrupted,
+    /// The job ran out of disk space although the required minimum was free. Such releases are counted.
+    OutOfSpace,
+}
+
+/// Queues a leased job again, to be claimed after a delay. Neither the attempt nor its slot time counts.
 pub(crate) async fn release(
     tx: &mut Tx,
     claim: &JobClaim,
     delay_s: u32,
-    out_of_space: bool,
+    cause: ReleaseCause,
 ) -> Result<()> {
+    let is_out_of_space = cause == ReleaseCause::OutOfSpace;
     sqlx::query!(
         "UPDATE jobs SET state = 'queued', worker = NULL, nonce = NULL, progress = 0,
                           charged_ms = 0, attempts = attempts - 1, claimable_at = ?,
                           without_room = without_room + ?
          WHERE id = ?",
         Instant(seconds_later(tx.now, delay_s)),
-        out_of_space,
+        is_out_of_space,
         Text(claim.job),
     )
     .execute(&mut **tx)

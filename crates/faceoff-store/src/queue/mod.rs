@@ -12,11 +12,11 @@ mod shares;
 pub(crate) use due_times::{shift_due_times, shorten_due_times};
 pub(crate) use jobs::{
     LeasedJob, NewJob, QueueGauges, claim_next, drop_jobs, end_leases, gauges, insert, requeue,
-    resume,
+    wake_workers,
 };
 pub use lease::JobClaim;
 pub(crate) use lease::{
-    ClaimState, claim_state, is_holder, is_leased, lease_holder, leases, mark_done, park, release,
-    renew, renew_all_leases, renew_leases, requeue_failed, transfer, unpark,
+    ClaimState, ReleaseCause, claim_state, is_holder, is_leased, lease_holder, leases, mark_done,
+    park, release, renew, renew_all_leases, renew_leases, requeue_failed, transfer, unpark,
 };
 pub(crate) use shares::{Lane, SlotTimeAccount, open_account};

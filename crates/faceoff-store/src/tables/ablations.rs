@@ -3,7 +3,7 @@
 use crate::{
     column::Instant,
     error::{Result, StoreError},
-    tables::progress::RunProgress,
+    tables::run_progress::RunProgress,
 };
 use faceoff_types::{AblationId, ProfileMap, RunId, SubmissionId};
 use jiff::Timestamp;

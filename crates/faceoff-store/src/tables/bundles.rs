@@ -1,5 +1,5 @@
 //! Bundles (uploaded agents): quotas of the teams, and bundles that can be deleted. The data are columns of the table of
-//! submissions.
+//! submissions. *Evidence* are the bundles of a team that is disqualified, or that an organiser has retired: they are kept.
 
 use crate::{
     column::Instant,
@@ -100,7 +100,7 @@ pub(crate) async fn usage(
 
 /// Submissions that did not pass their validation and whose bundles are stored, with their keys. These are invalid ones,
 /// and those uploaded until `uploaded_until` whose validation ended by a platform fault. Bundles that are used by a run or
-/// another submission, and those of teams under investigation, are left out.
+/// another submission, and evidence, are left out.
 pub(crate) async fn with_failed_validation(
     connection: &mut SqliteConnection,
     uploaded_until: Timestamp,
@@ -125,6 +125,7 @@ pub(crate) async fn with_failed_validation(
         .collect())
 }
 
+/// Marks the bundle of a submission that did not pass its validation as removed, with its file.
 pub(crate) async fn set_failed_removed(
     connection: &mut SqliteConnection,
     id: SubmissionId,

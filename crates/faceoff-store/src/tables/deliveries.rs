@@ -82,7 +82,7 @@ impl TryFrom<DeliveryRow> for Delivery {
             (None, Some(at)) if row.is_delivered => DeliveryState::Delivered { at: at.0 },
             (None, Some(at)) => DeliveryState::GivenUp { at: at.0 },
             _ => {
-                let message = format!("delivery {}: neither waiting nor settled", row.id);
+                let message = format!("delivery {}: neither pending nor ended", row.id);
                 return Err(StoreError::Damaged(message));
             }
         };
@@ -121,7 +121,7 @@ fn parse_all(rows: Vec<DeliveryRow>) -> Result<Vec<Delivery>> {
     rows.into_iter().map(Delivery::try_from).collect()
 }
 
-/// The due delivery of each enabled webhook that has waited longest, in the order in which they became due.
+/// Of each enabled webhook the due delivery that has waited longest, in the order in which they became due.
 pub(crate) async fn due(
     connection: &mut SqliteConnection,
     now: Timestamp,

@@ -59,7 +59,7 @@ pub(crate) async fn of_scoring_job(
     Ok(found.fetch_optional(connection).await?)
 }
 
-/// The proposal that the evaluation of a run was made by, whether it is applied or not.
+/// The proposal that created the evaluation of a run, whether it is applied or not.
 pub(crate) async fn proposal_of_run(
     connection: &mut SqliteConnection,
     run: RunId,

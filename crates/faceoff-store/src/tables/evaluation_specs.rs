@@ -87,7 +87,7 @@ pub(crate) async fn insert(
     Ok(())
 }
 
-/// Adds a queued evaluation of a proposal: of submission and team, in a run, and the evaluation that it repeats.
+/// Adds a queued evaluation of a proposal. `run` plays its episodes; `replaces` is the evaluation that it repeats, `None` in a trial.
 pub(crate) async fn insert_proposed(
     connection: &mut SqliteConnection,
     proposal: &Proposal,

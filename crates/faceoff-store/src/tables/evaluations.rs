@@ -1,11 +1,13 @@
 //! The table of evaluations: their state from the queue to the result. It holds those of days, which count, and those of
-//! proposals (trials and proposed re-evaluations), which do not. The view `counting_evaluations` has the former only.
+//! proposals (trials and proposed re-evaluations), which do not. The view `counting_evaluations` has the former only, also if
+//! they are open or voided.
 
 use crate::{
     column::{Instant, Json},
     error::{Result, StoreError},
     tables::{
-        decision_records::DecisionRecord, plan::RunPlan, progress::RunProgress, runs::RunState,
+        decision_records::DecisionRecord, run_plan::RunPlan, run_progress::RunProgress,
+        runs::RunState,
     },
 };
 use faceoff_types::{
@@ -134,7 +136,7 @@ pub(crate) struct EvaluationRow {
     submission_id: SubmissionId,
     team_id: TeamId,
     stage_id: StageId,
-    /// The proposal that it was made by, if it was.
+    /// The proposal that created it, if one did.
     proposal_id: Option<ProposalId>,
     /// `None` for a trial.
     day: Option<Text<Date>>,
@@ -158,7 +160,9 @@ pub(crate) struct EvaluationRow {
     dataset: Option<String>,
     dataset_blake3: Option<String>,
     reason: Option<String>,
+    /// Was it cancelled because its day's deadline passed?
     unplayed: bool,
+    /// The reason of an extra evaluation.
     extra_for: Option<String>,
     voided_at: Option<Instant>,
     voided_for: Option<String>,
@@ -173,7 +177,7 @@ impl EvaluationRow {
         (self.state == "open" && self.run_state == RunState::Running).then_some(self.run_id)
     }
 
-    /// The proposal that the evaluation was made by.
+    /// The proposal that created the evaluation.
     pub(crate) fn proposal(&self) -> Result<ProposalId> {
         self.proposal_id
             .ok_or_else(|| self.damaged("without a proposal"))

@@ -108,7 +108,7 @@ pub struct StoredGameResult {
     pub at: Timestamp,
     /// A game's `results.json`, as computed by the scoring.
     pub results: Value,
-    /// Its stored files; `None` for a game of a replay.
+    /// Its stored files; `None` for a game of a repeated schedule.
     pub recording: Option<GameRecording>,
 }
 
@@ -128,7 +128,7 @@ pub struct GameRecording {
 pub struct GameCommit {
     /// A game's `results.json`, as computed by the scoring.
     pub results: Value,
-    /// Files that are stored already; `None` exactly for a game of a replay.
+    /// Files that are stored already; `None` exactly for a game of a repeated schedule.
     pub recording: Option<GameRecording>,
     /// The tails of both agents' standard errors, with their faults.
     pub logs: [String; 2],

@@ -160,17 +160,17 @@ pub(crate) async fn list(
     rows.into_iter().map(Invitation::try_from).collect()
 }
 
-/// Deletes at most `limit` invitations that were revoked, or expired unused, at `ended_before` or earlier. Returns their number.
-pub(crate) async fn forget_ended(
+/// Deletes at most `limit` invitations that were revoked, or expired unused, at `ended_until` or earlier. Returns their number.
+pub(crate) async fn delete_ended(
     connection: &mut SqliteConnection,
-    ended_before: Timestamp,
+    ended_until: Timestamp,
     limit: u32,
 ) -> Result<usize> {
     let deleted = sqlx::query!(
         "DELETE FROM invitations WHERE id IN (
              SELECT id FROM invitations
              WHERE accepted_at IS NULL AND coalesce(revoked_at, expires_at) <= ? LIMIT ?)",
-        Instant(ended_before),
+        Instant(ended_until),
         limit
     )
     .execute(connection)

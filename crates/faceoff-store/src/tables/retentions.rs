@@ -141,7 +141,7 @@ pub(crate) async fn count_proposals(
 
 /// Stored bundles, with their sizes, of submissions that were evaluated in a stage and are not needed any more. None is
 /// active or has open jobs, and all their datasets are removed or in `removable`. None can be evaluated again, because
-/// their stages are signed off.
+/// their stages are signed off, or the season is closed.
 pub(crate) async fn idle_bundles(
     connection: &mut SqliteConnection,
     stage: StageId,

@@ -3,7 +3,7 @@
 use crate::{
     column::{Instant, Json},
     error::{Result, StoreError},
-    tables::plan::RunPlan,
+    tables::run_plan::RunPlan,
 };
 use faceoff_types::{Ruleset, RunId, SeedLabel, SubmissionId};
 use jiff::Timestamp;

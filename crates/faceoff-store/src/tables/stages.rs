@@ -4,7 +4,7 @@ use crate::{
     column::{Instant, Json},
     error::{Result, StoreError},
     event::Actor,
-    tables::{plan::RunPlan, sign_offs::SignOff},
+    tables::{run_plan::RunPlan, sign_offs::SignOff},
 };
 use faceoff_types::{
     DayDeadline, IanaTimeZone, SeedLabel, StageDay, StageId, StageName, StageRules, StageSettings,

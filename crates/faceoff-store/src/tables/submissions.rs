@@ -290,7 +290,7 @@ pub(crate) async fn share_log(connection: &mut SqliteConnection, id: SubmissionI
 }
 
 /// Empties the logs of this submission's team's invalid submissions, except the newest `kept`.
-pub(crate) async fn forget_old_logs(
+pub(crate) async fn empty_old_logs(
     connection: &mut SqliteConnection,
     id: SubmissionId,
     kept: u32,

@@ -259,7 +259,7 @@ pub(crate) async fn check_may_compete(connection: &mut SqliteConnection, id: Tea
     }
 }
 
-/// [`StoreError::TeamNameTaken`] if another team has the name, or one that looks like it.
+/// [`StoreError::TeamNameTaken`] if another team has the name, or one that looks like it (has the same skeleton).
 pub(crate) async fn check_name(
     connection: &mut SqliteConnection,
     id: Option<TeamId>,

@@ -70,8 +70,8 @@ impl TokenKind {
     }
 }
 
-/// Who made a credential (a token, an invitation or a webhook), or gave it its current secret. It ends with that user's account, and
-/// when the user gets a new password or new access.
+/// Who made a credential (a token, an invitation or a webhook), or gave it its current secret. The credential is revoked when that
+/// user's account is closed, and when the user gets a new password or gets access again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Creator {
     /// `None`: the operator, a visitor or the server.
@@ -155,9 +155,10 @@ macro_rules! select_tokens {
     };
 }
 
-/// The owners whose tokens and sessions a list has.
+/// The owners whose tokens and sessions a list contains.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TokenFilter {
+    /// All owners: users, teams and the operator.
     Everyone,
     /// Those of a user.
     User(UserId),
@@ -274,18 +275,18 @@ pub(crate) async fn valid(
     Ok(rows.into_iter().map(Token::from).collect())
 }
 
-/// Deletes at most `limit` tokens and sessions that ended at `ended_before` or earlier. Credentials that were created with a
+/// Deletes at most `limit` tokens and sessions that ended at `ended_until` or earlier. Credentials that were created with a
 /// deleted token are attributed to the token that created it, so that they still end with that one. Tokens of the operator stay: a revoked
 /// one in the file of a restored data folder must be recognised. Returns the number of tokens.
-pub(crate) async fn forget_ended(
+pub(crate) async fn delete_ended(
     connection: &mut SqliteConnection,
-    ended_before: Timestamp,
+    ended_until: Timestamp,
     limit: u32,
 ) -> Result<usize> {
     let ended = sqlx::query!(
         r#"SELECT id AS "id!: TokenId" FROM tokens
            WHERE coalesce(revoked_at, expires_at) <= ? AND owner <> 'host' ORDER BY coalesce(revoked_at, expires_at) LIMIT ?"#,
-        Instant(ended_before),
+        Instant(ended_until),
         limit
     )
     .fetch_all(&mut *connection)

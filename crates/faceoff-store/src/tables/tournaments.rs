@@ -1,4 +1,4 @@
-//! The table of tournaments: rounds of games among teams, each round with the winners of the round before.
+//! The table of tournaments: games among teams in rounds. The format in a tournament's rules says which teams play each other in a round.
 
 use crate::{
     column::{Instant, Json},
@@ -18,7 +18,7 @@ pub struct Tournament {
     pub id: TournamentId,
     /// Number in its season, from 1; its seeds derive from it.
     pub number: u32,
-    /// Unique regardless of case.
+    /// Unique regardless of case. Tournaments have the same type of name as stages.
     pub name: StageName,
     pub created_at: Timestamp,
     /// The stage whose tiers (grades of its results) selected the first entrants, if any.

@@ -1,4 +1,5 @@
-//! The table of users (in SQL `people`): the accounts of organisers and of the teams' members.
+//! The table of users (in SQL `people`): the accounts of organisers and of the teams' members. Two names *look alike* if they have the
+//! same skeleton ([`name_skeleton`]), for example `Team 0` and `Team O`.
 
 use crate::{
     column::Instant,
@@ -106,9 +107,25 @@ pub(crate) async fn find_with_password(
     Ok(row.map(|row| (row.id, row.password)))
 }
 
-/// The users who joined by invitations that this user has made, or that were made with this token. With `restored`, those who got
-/// access again by them. By name; also those who have left.
-pub(crate) async fn invited(
+/// The users who joined by invitations that this user has made, or that were made with this token. By name; also those who have
+/// left.
+pub(crate) async fn joined_by(
+    connection: &mut SqliteConnection,
+    creator: Creator,
+) -> Result<Vec<User>> {
+    invited(connection, creator, false).await
+}
+
+/// The users who got access again by links that this user has made, or that were made with this token. By name; also those who
+/// have left.
+pub(crate) async fn restored_by(
+    connection: &mut SqliteConnection,
+    creator: Creator,
+) -> Result<Vec<User>> {
+    invited(connection, creator, true).await
+}
+
+async fn invited(
     connection: &mut SqliteConnection,
     creator: Creator,
     restored: bool,

@@ -18,12 +18,12 @@ pub struct Webhook {
     /// A label, chosen by its owner.
     pub name: String,
     pub url: String,
-    /// Topics of the events that are sent; empty: all events that its owner may see.
+    /// Topics, subjects and kinds of the events that are sent; empty: all events that its owner may see.
     pub topics: Vec<String>,
     /// Who created it or chose its current address.
     pub creator: Creator,
     pub created_at: Timestamp,
-    /// Deliveries exist for all events up to this id.
+    /// Id of the last event that was considered: of all events up to it those that match have their delivery.
     pub seen: i64,
     /// Time of the first failed delivery since the last success; `None` if the last one succeeded or none was sent.
     pub failing_since: Option<Timestamp>,
@@ -215,7 +215,7 @@ pub(crate) async fn update(connection: &mut SqliteConnection, webhook: &Webhook)
     Ok(())
 }
 
-/// Records that deliveries exist for all events up to `seen`.
+/// Records that all events up to `seen` have been considered, and those that match have their delivery.
 pub(crate) async fn set_seen(
     connection: &mut SqliteConnection,
     id: WebhookId,

@@ -1,5 +1,5 @@
-//! Ablations: runs of a submission under several profiles (settings of disturbances), in order to see which disturbances
-//! cost it points. They count for no board, so that workers run them after all other jobs.
+//! Ablations: runs of a submission under several profiles (sets of perturbations), in order to see which perturbations cost it
+//! points. They count for no board, so workers run them after all jobs that count.
 
 use crate::fixture::{TestStore, shard_commit, six_shard_plan};
 use faceoff_airhockey::{ABLATION_PROFILES, TASKS};

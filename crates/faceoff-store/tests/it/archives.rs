@@ -7,7 +7,7 @@ use faceoff_types::*;
 use sqlx::{AssertSqlSafe, Connection, SqliteConnection};
 use std::{collections::BTreeMap, path::Path, time::Duration};
 
-/// Columns of the tables in the public archive. A new column must be reviewed in `scrub.rs` (is it public?) and then
+/// Columns of the tables in the public archive. A new column must be reviewed in `scrub_archive.rs` (is it public?) and then
 /// listed here. A table that is not listed is emptied there.
 const PUBLIC_COLUMNS: &[(&str, &str)] = &[
     ("ablation_runs", "ablation_id run_id"),
@@ -94,7 +94,7 @@ const PUBLIC_COLUMNS: &[(&str, &str)] = &[
     ),
 ];
 
-/// Hash of the code of Ada's invitation.
+/// Hash of the secret code in the invitation link of a user, Ada.
 const CODE_HASH: [u8; 32] = [7; 32];
 
 async fn open(file: &Path) -> SqliteConnection {
@@ -117,7 +117,7 @@ async fn count(file: &Path, table: &str) -> i64 {
     rows.fetch_one(&mut open(file).await).await.unwrap()
 }
 
-/// A folder with the database of an archive of this edition.
+/// A folder with the database of an archive of this edition, with an empty episode summary of each run.
 async fn export(f: &TestStore, edition: Edition) -> tempfile::TempDir {
     let runs = f.store.unsummarised_runs(1).await.unwrap();
     let summaries = MissingSummaries {
@@ -283,10 +283,15 @@ async fn public_archive_has_results_without_episodes() {
     let alpha = f.valid_submission_of("Alpha").await;
     let evaluation = f.evaluate(alpha.id, &one_shard_plan()).await;
     f.run_all_with_score(1.0).await;
-    let none = MissingSummaries::default();
-    let public = f
-        .store
-        .snapshot(f.folder.path(), Edition::Public, "a test", &none, f.now);
+    // Without an episode summary a public archive could not show the board.
+    let no_summaries = MissingSummaries::default();
+    let public = f.store.snapshot(
+        f.folder.path(),
+        Edition::Public,
+        "a test",
+        &no_summaries,
+        f.now,
+    );
     let error = public.await.unwrap_err();
     assert!(
         matches!(&error, StoreError::Conflict(reason) if reason.contains("1 results came in")),
@@ -446,11 +451,12 @@ async fn archive_detection_leaves_folder_unchanged() {
 #[tokio::test]
 async fn import_refuses_manipulated_database() {
     let (f, _) = season_with_queued_day().await;
-    let planted = "CREATE TRIGGER help AFTER UPDATE ON archived BEGIN
+    // Would create a token of the operator, during the import.
+    let planted_trigger = "CREATE TRIGGER help AFTER UPDATE ON archived BEGIN
         INSERT INTO tokens (id, hash, kind, owner, name, created_at)
         VALUES ('0', zeroblob(32), 'key', 'host', 'mine', 0); END";
     for (sql, phrase) in [
-        (planted, "its trigger \"help\" is not as this program makes it"),
+        (planted_trigger, "its trigger \"help\" is not as this program makes it"),
         ("CREATE VIEW notes AS SELECT 1", "its view \"notes\""),
         ("CREATE TABLE more (a)", "its table \"more\""),
         ("DROP TRIGGER a_closed_season_stays_closed", "its trigger \"a_closed_season_stays_closed\""),

@@ -1,4 +1,5 @@
-//! A clock that goes back, or jumps ahead: jobs, webhook deliveries and evaluation days.
+//! A host's clock that goes back, or jumps ahead: jobs, webhook deliveries and evaluation days. An organiser can *accept* such a step;
+//! until then the server does not follow it.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -8,8 +9,8 @@ use sqlx::Connection as _;
 
 const DAY_S: i64 = 86_400;
 
-/// Accepts a step of the clock.
-async fn set_clock(f: &mut TestStore, by_s: i64) {
+/// Moves the clock, as an organiser accepts a step.
+async fn accept_clock_step(f: &mut TestStore, by_s: i64) {
     f.advance_clock_s(by_s);
     let by = SignedDuration::from_secs(by_s);
     let accepted = f.store.accept_clock_step(
@@ -33,7 +34,7 @@ async fn accepted_step_ends_no_lease_and_delays_no_job() {
             .release_after_platform_fault(&failed, "a fault", f.now)
             .await
             .unwrap();
-        set_clock(&mut f, by_s).await;
+        accept_clock_step(&mut f, by_s).await;
         f.advance_clock_s(1);
         assert!(f.claim().await.is_none(), "one job runs, the other waits");
         let renewed = f.store.heartbeat(&running, 1, LEASE_S, f.now).await;
@@ -103,7 +104,7 @@ async fn future_deliveries_are_due_after_a_restart() {
         due.fetch_one(&mut connection).await.unwrap()
     };
     assert_eq!(due().await, f.now.as_millisecond());
-    set_clock(&mut f, -DAY_S).await;
+    accept_clock_step(&mut f, -DAY_S).await;
     assert_eq!(due().await, f.now.as_millisecond());
     connection.close().await.unwrap();
 }
@@ -159,6 +160,7 @@ async fn voided_future_day_frees_the_schedule() {
 async fn empty_future_day_does_not_hold_the_schedule() {
     let mut f = TestStore::new().await;
     let stage = f.configure_stage(&two_shard_plan()).await;
+    // While the clock is three days ahead, a day starts without any submission.
     f.advance_clock_s(3 * DAY_S);
     let empty = f.store.start_scheduled_day(stage, f.now).await.unwrap();
     assert_eq!(empty, Some(Vec::new()));

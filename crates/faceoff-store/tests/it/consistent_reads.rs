@@ -1,4 +1,4 @@
-//! Groups of reads that see one state of the database, as a page needs them.
+//! *Groups* of reads, all of which see the same state of the database although others write meanwhile, as a page needs them.
 
 use crate::fixture::*;
 

@@ -1,5 +1,5 @@
 //! Days that take too long: workers run their evaluations before those of later days, until the day's deadline ends them.
-//! A day starts at its *cutoff* and is *released* (shown on boards) once all its evaluations have ended.
+//! A day starts at its *cutoff* and is *released* once all its evaluations have ended: then its seed and datasets are no longer secret.
 
 use crate::fixture::*;
 use faceoff_store::*;

@@ -1,4 +1,5 @@
-//! [`TestStore`]: a store in a temporary folder with a clock that the test sets, and helpers for the steps of a competition.
+//! [`TestStore`], which tests call `f` (fixture): a store in a temporary folder with a clock that the test sets, and helpers for the
+//! steps of a competition.
 //!
 //! A team submits an agent. A *validation run* checks it, and on each day it is evaluated: workers claim (lease) jobs from
 //! the queue, which are the *shards* of a run (episodes that are run together), and a scoring job at the end.
@@ -349,7 +350,8 @@ pub fn shard_commit(shard: &Shard, faults: u32) -> ShardCommit {
     }
 }
 
-/// Outcome of an episode that ended by an agent fault, or in success. Its times are no short decimals.
+/// Outcome of an episode that ended by an agent fault, or in success. Its times are no short decimals, so that a test notices if the
+/// database rounds them.
 pub fn outcome(task: Task, episode: u32, is_faulty: bool) -> EpisodeOutcome {
     EpisodeOutcome {
         violations: [EE].into(),
@@ -361,7 +363,7 @@ pub fn outcome(task: Task, episode: u32, is_faulty: bool) -> EpisodeOutcome {
     }
 }
 
-/// Result of an evaluation. Its penalty points are no short decimal.
+/// Result of an evaluation. Its penalty points are no short decimal, so that a test notices if the database rounds them.
 pub fn result(score: f64) -> EvaluationResult {
     EvaluationResult {
         ruleset: faceoff_airhockey::RULESET.to_string(),

@@ -24,7 +24,7 @@ enum Action {
     Restart,
 }
 
-/// A random action. The numbers are relative frequencies.
+/// A random action; in front of each its relative frequency.
 fn action() -> impl Strategy<Value = Action> {
     prop_oneof![
         6 => Just(Action::Claim),

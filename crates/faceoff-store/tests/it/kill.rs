@@ -18,8 +18,8 @@ use std::{
 const ARTIFACT_BYTES: usize = 300_000;
 /// Environment variable with the data folder of the child process.
 const FOLDER_VARIABLE: &str = "FACEOFF_STORE_TEST_FOLDER";
-/// Environment variable of the child process; if set, every round ends with file removal, and skips the organiser's operations on
-/// results, which take long.
+/// Environment variable of the child process. If it is set, every round ends with the removal of files, and has no operations of
+/// organisers on results, which take long.
 const REMOVES_FILES_VARIABLE: &str = "FACEOFF_STORE_TEST_CLEARS";
 
 /// Writes until its process is killed, and prints every acknowledged write. The tests below start it.
@@ -52,7 +52,7 @@ async fn child_process_writes_until_killed() {
             .and_then(|()| out.flush())
             .unwrap();
     };
-    // Part of names, so that those of each process are unique.
+    // In the names of stages (`s …`), teams (`t …`) and users, so that those of each process are unique.
     let process = uuid::Uuid::now_v7();
     for round in 0.. {
         sign_off(

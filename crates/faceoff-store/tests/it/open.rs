@@ -1,4 +1,4 @@
-//! The opening of a store, and its behaviour when values in its database are damaged.
+//! The opening of a store, its behaviour when values in its database are damaged, and the competition that a season is bound to.
 
 use crate::fixture::*;
 use faceoff_airhockey::{HIT, IDEAL};

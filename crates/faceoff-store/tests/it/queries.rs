@@ -5,7 +5,7 @@ use crate::fixture::*;
 use sqlx::{Row, SqlSafeStr};
 
 /// Tables that grow with teams × days, or with what teams and visitors do.
-const LARGE: [&str; 11] = [
+const LARGE_TABLES: [&str; 11] = [
     "evaluations",
     "runs",
     "shards",
@@ -85,7 +85,7 @@ async fn queries_do_not_scan_growing_tables() {
                 table_of_alias(&sql, name)
             });
             let is_small = SMALL_INDEXES.iter().any(|index| step.ends_with(index));
-            let is_large = |table: String| LARGE.contains(&table.as_str());
+            let is_large = |table: String| LARGE_TABLES.contains(&table.as_str());
             if !is_small && scanned.is_some_and(is_large) {
                 scans.push(format!("{step} in {sql}"));
             }
@@ -95,9 +95,9 @@ async fn queries_do_not_scan_growing_tables() {
     assert_eq!(board_queries, 1, "the board query is checked, too");
 }
 
-/// Queries of the table of evaluations that need not ask for which of them count, identified by a fragment, each with its
-/// reason.
-const OF_ALL_EVALUATIONS: [(&str, &str); 4] = [
+/// Queries that may read all evaluations, also those of trials and proposals, which do not count. They are identified by a
+/// fragment, each with its reason.
+const MAY_READ_ALL_EVALUATIONS: [(&str, &str); 4] = [
     (
         "FROM runs r",
         "recordings and shards go with any evaluation",
@@ -112,7 +112,7 @@ const OF_ALL_EVALUATIONS: [(&str, &str); 4] = [
 
 #[test]
 fn queries_without_exemption_read_counting_evaluations() {
-    let mut whole_table = 0;
+    let mut reads_of_whole_table = 0;
     for (_, data) in query_data() {
         let sql = data["query"].as_str().unwrap();
         let words: Vec<_> = sql.split_whitespace().collect();
@@ -120,16 +120,19 @@ fn queries_without_exemption_read_counting_evaluations() {
             .windows(2)
             .any(|pair| ["FROM", "JOIN"].contains(&pair[0]) && pair[1] == "evaluations");
         let names_purpose = sql.contains("purpose") || sql.contains("proposal_id");
-        let has_reason = OF_ALL_EVALUATIONS
+        let is_exempt = MAY_READ_ALL_EVALUATIONS
             .iter()
             .any(|(fragment, _)| sql.contains(fragment));
         assert!(
-            !reads_all || names_purpose || has_reason,
+            !reads_all || names_purpose || is_exempt,
             "this query reads trials, too: {sql}"
         );
-        whole_table += usize::from(reads_all);
+        reads_of_whole_table += usize::from(reads_all);
     }
-    assert!(whole_table > 0, "the table is found in the queries");
+    assert!(
+        reads_of_whole_table > 0,
+        "the table is found in the queries"
+    );
 }
 
 /// The table of an alias in a query (`FROM evaluations e`).
@@ -137,7 +140,7 @@ fn table_of_alias(sql: &str, name: &str) -> String {
     let words: Vec<_> = sql.split_whitespace().collect();
     words
         .windows(2)
-        .find(|pair| pair[1] == name && LARGE.contains(&pair[0]))
+        .find(|pair| pair[1] == name && LARGE_TABLES.contains(&pair[0]))
         .map_or(name, |pair| pair[0])
         .to_owned()
 }

@@ -1,5 +1,5 @@
-//! The end of a day: it is released, so that its results are published, once all its evaluations have ended; after platform
-//! faults evaluations are rerun first. Also the end of a season.
+//! The end of a day: it is *released* once all its evaluations have ended, so that its seed is public and teams get their datasets.
+//! After platform faults evaluations are rerun first. Also the end of a season.
 
 use crate::fixture::*;
 use faceoff_airhockey::ABLATION_PROFILES;

@@ -26,13 +26,13 @@ struct JobRecord {
     /// Name of the team; empty for a scoring or an ablation.
     team: &'static str,
     kind: JobKind,
-    /// Start, in seconds since [`Slots::started_at`].
+    /// Start, in seconds since [`SlotSimulation::started_at`].
     start_s: i64,
     end_s: i64,
 }
 
-/// Simulated slots of a worker.
-struct Slots {
+/// Simulated slots of a worker, and the store whose jobs they run.
+struct SlotSimulation {
     f: TestStore,
     /// Names of the teams.
     teams: BTreeMap<TeamId, &'static str>,
@@ -45,7 +45,7 @@ struct Slots {
     job_records: Vec<JobRecord>,
 }
 
-impl Slots {
+impl SlotSimulation {
     async fn new(slot_count: usize) -> Self {
         let f = TestStore::new().await;
         let started_at = f.now;
@@ -239,39 +239,39 @@ impl TestStore {
     }
 }
 
-/// Runs the slots until no job is left.
+/// As `stops` of [`SlotSimulation::run`]: the slots run until no job is left.
 const NEVER: fn(&[JobRecord]) -> bool = |_| false;
 
 #[tokio::test]
 async fn slow_uploads_do_not_delay_other_teams() {
     for uploads in [2, 5] {
         for slots in [1, 2] {
-            let mut s = Slots::new(slots).await;
-            s.queue_evaluations(&[("Quick", 40)]).await;
-            let slow_validations = s.create_team("Slow validations").await;
+            let mut sim = SlotSimulation::new(slots).await;
+            sim.queue_evaluations(&[("Quick", 40)]).await;
+            let slow_validations = sim.create_team("Slow validations").await;
             for _ in 0..uploads {
-                s.f.upload(&slow_validations).await;
+                sim.f.upload(&slow_validations).await;
             }
             let duration_s = |_, kind| if kind == JobKind::Validation { 100 } else { 10 };
-            s.run(duration_s, NEVER).await;
-            let validations: Vec<usize> = (0..s.job_records.len())
-                .filter(|index| s.job_records[*index].kind == JobKind::Validation)
+            sim.run(duration_s, NEVER).await;
+            let validations: Vec<usize> = (0..sim.job_records.len())
+                .filter(|index| sim.job_records[*index].kind == JobKind::Validation)
                 .collect();
             assert_eq!(validations.len(), uploads);
             // Ten shards take as long as one validation run.
             for pair in validations.windows(2) {
-                let shards_left = s.job_records[pair[1]..]
+                let shards_left = sim.job_records[pair[1]..]
                     .iter()
                     .filter(|job| job.kind == JobKind::Shard)
                     .count();
-                let shards_between = s.job_records[pair[0]..pair[1]]
+                let shards_between = sim.job_records[pair[0]..pair[1]]
                     .iter()
                     .filter(|job| job.kind == JobKind::Shard)
                     .count();
                 assert!(
                     shards_between >= 10 - slots || shards_left == 0,
                     "{slots} slots: {:?}",
-                    s.claim_order()
+                    sim.claim_order()
                 );
             }
         }
@@ -280,17 +280,19 @@ async fn slow_uploads_do_not_delay_other_teams() {
 
 #[tokio::test]
 async fn upload_flood_delays_other_team_by_one_job() {
-    let mut s = Slots::new(1).await;
-    let flood = s.create_team("Flood").await;
+    let mut sim = SlotSimulation::new(1).await;
+    let flood = sim.create_team("Flood").await;
     for _ in 0..20 {
-        s.f.upload(&flood).await;
+        sim.f.upload(&flood).await;
     }
-    s.run(|_, _| 60, |job_records| job_records.len() == 3).await;
-    let other = s.create_team("Other").await;
-    s.f.upload(&other).await;
-    s.f.upload(&other).await;
-    s.run(|_, _| 60, |job_records| job_records.len() == 7).await;
-    let teams: Vec<_> = s.job_records.iter().map(|job| job.team).collect();
+    sim.run(|_, _| 60, |job_records| job_records.len() == 3)
+        .await;
+    let other = sim.create_team("Other").await;
+    sim.f.upload(&other).await;
+    sim.f.upload(&other).await;
+    sim.run(|_, _| 60, |job_records| job_records.len() == 7)
+        .await;
+    let teams: Vec<_> = sim.job_records.iter().map(|job| job.team).collect();
     assert_eq!(
         teams,
         [
@@ -308,30 +310,30 @@ async fn slot_time_is_equal_for_waiting_teams() {
     for slots in [1, 3] {
         // In several orders, so that being first is no advantage.
         for order in [[0, 1, 2], [2, 1, 0], [1, 2, 0]] {
-            let mut s = Slots::new(slots).await;
-            s.queue_evaluations(&order.map(|index| (teams[index].0, teams[index].1)))
+            let mut sim = SlotSimulation::new(slots).await;
+            sim.queue_evaluations(&order.map(|index| (teams[index].0, teams[index].1)))
                 .await;
             let duration_s = |team, kind| match kind {
                 JobKind::Shard => teams.iter().find(|(name, ..)| *name == team).unwrap().2,
                 _ => 1,
             };
-            s.run(duration_s, NEVER).await;
+            sim.run(duration_s, NEVER).await;
             assert_eq!(
-                s.job_records
+                sim.job_records
                     .iter()
                     .filter(|job| job.kind == JobKind::Shard)
                     .count(),
                 3 + 15 + 60
             );
             // While all three teams have queued jobs, none is ahead by more than one job per slot.
-            for end in 1..s.job_records.len() {
-                let (before, after) = s.job_records.split_at(end);
+            for end in 1..sim.job_records.len() {
+                let (before, after) = sim.job_records.split_at(end);
                 let is_waiting = |name| after.iter().any(|job| job.team == name);
                 if !teams.iter().all(|(name, ..)| is_waiting(*name)) {
                     break;
                 }
-                let times =
-                    teams.map(|(name, ..)| Slots::slot_time_s(before, |job| job.team == name));
+                let times = teams
+                    .map(|(name, ..)| SlotSimulation::slot_time_s(before, |job| job.team == name));
                 let difference = times.iter().max().unwrap() - times.iter().min().unwrap();
                 assert!(
                     difference <= MAX_DURATION_S * (1 + slots as i64),
@@ -344,56 +346,56 @@ async fn slot_time_is_equal_for_waiting_teams() {
 
 #[tokio::test]
 async fn running_jobs_count_as_slot_time() {
-    let mut s = Slots::new(4).await;
-    s.queue_evaluations(&[("A", 9), ("B", 9), ("C", 9)]).await;
-    s.run(|_, _| 1000, |job_records| job_records.len() == 6)
+    let mut sim = SlotSimulation::new(4).await;
+    sim.queue_evaluations(&[("A", 9), ("B", 9), ("C", 9)]).await;
+    sim.run(|_, _| 1000, |job_records| job_records.len() == 6)
         .await;
-    let mut first_teams: Vec<_> = s.job_records[..3].iter().map(|job| job.team).collect();
+    let mut first_teams: Vec<_> = sim.job_records[..3].iter().map(|job| job.team).collect();
     first_teams.sort_unstable();
     assert_eq!(first_teams, ["A", "B", "C"]);
     let mut job_counts = BTreeMap::new();
-    for job in &s.job_records {
+    for job in &sim.job_records {
         *job_counts.entry(job.team).or_insert(0) += 1;
     }
     assert!(
         job_counts.values().all(|count| *count == 2),
         "{:?}",
-        s.claim_order()
+        sim.claim_order()
     );
 }
 
 #[tokio::test]
 async fn slot_time_credit_expires_after_a_pause() {
-    let mut s = Slots::new(1).await;
-    s.queue_evaluations(&[("Busy", 60)]).await;
-    s.run(|_, _| 60, |job_records| job_records.len() == 30)
+    let mut sim = SlotSimulation::new(1).await;
+    sim.queue_evaluations(&[("Busy", 60)]).await;
+    sim.run(|_, _| 60, |job_records| job_records.len() == 30)
         .await;
     // From now on two teams share equally: the new team does not catch up on the half hour that it had no jobs.
-    s.queue_evaluations(&[("New", 30)]).await;
-    s.run(|_, _| 60, |job_records| job_records.len() == 50)
+    sim.queue_evaluations(&[("New", 30)]).await;
+    sim.run(|_, _| 60, |job_records| job_records.len() == 50)
         .await;
-    let with_new = &s.job_records[30..];
+    let with_new = &sim.job_records[30..];
     let sequences = with_new.chunk_by(|a, b| a.team == b.team).map(<[_]>::len);
     assert_eq!(
         sequences.max(),
         Some(1),
         "the teams alternate: {:?}",
-        s.claim_order()
+        sim.claim_order()
     );
     // The same holds for kinds of jobs: the validation runs of a third team alternate with the shards of both teams.
-    let third = s.create_team("Third").await;
+    let third = sim.create_team("Third").await;
     for _ in 0..10 {
-        s.f.upload(&third).await;
+        sim.f.upload(&third).await;
     }
-    s.run(|_, _| 60, |job_records| job_records.len() == 70)
+    sim.run(|_, _| 60, |job_records| job_records.len() == 70)
         .await;
-    let with_third = &s.job_records[50..];
+    let with_third = &sim.job_records[50..];
     let sequences = with_third.chunk_by(|a, b| a.kind == b.kind).map(<[_]>::len);
     assert_eq!(
         sequences.max(),
         Some(1),
         "the kinds alternate: {:?}",
-        s.claim_order()
+        sim.claim_order()
     );
     let validations = with_third
         .iter()
@@ -403,39 +405,41 @@ async fn slot_time_credit_expires_after_a_pause() {
 
 #[tokio::test]
 async fn ablations_run_last_and_scoring_first() {
-    let mut s = Slots::new(1).await;
-    s.queue_evaluations(&[("A", 3), ("B", 6)]).await;
-    let slow_validations = s.create_team("Slow validations").await;
-    let valid_submission =
-        s.f.store
-            .evaluation(*s.evaluations.keys().next().unwrap())
-            .await
-            .unwrap()
-            .submission;
+    let mut sim = SlotSimulation::new(1).await;
+    sim.queue_evaluations(&[("A", 3), ("B", 6)]).await;
+    let slow_validations = sim.create_team("Slow validations").await;
+    let valid_submission = sim
+        .f
+        .store
+        .evaluation(*sim.evaluations.keys().next().unwrap())
+        .await
+        .unwrap()
+        .submission;
     let one_episode_plan = RunPlan {
         episodes_per_task: 1,
         ..six_shard_plan()
     };
-    s.f.store
+    sim.f
+        .store
         .request_ablation(
             Actor::Operator,
             valid_submission,
             faceoff_airhockey::RULESET,
             &one_episode_plan,
             &ABLATION_PROFILES,
-            s.f.now,
+            sim.f.now,
         )
         .await
         .unwrap();
     for _ in 0..3 {
-        s.f.upload(&slow_validations).await;
+        sim.f.upload(&slow_validations).await;
     }
-    s.run(
+    sim.run(
         |_, kind| if kind == JobKind::Validation { 50 } else { 10 },
         NEVER,
     )
     .await;
-    let order = s.claim_order();
+    let order = sim.claim_order();
     let first_ablation = order
         .iter()
         .position(|(_, kind)| *kind == JobKind::Ablation)
@@ -461,63 +465,73 @@ async fn ablations_run_last_and_scoring_first() {
 
 #[tokio::test]
 async fn slot_time_lost_by_the_platform_is_not_charged() {
-    let mut s = Slots::new(1).await;
-    s.queue_evaluations(&[("A", 4), ("B", 4)]).await;
+    let mut sim = SlotSimulation::new(1).await;
+    sim.queue_evaluations(&[("A", 4), ("B", 4)]).await;
     // The first team's jobs fail by a platform fault, are released at a shutdown, or lose their lease, each after a long time.
     // The team's jobs stay the first in the queue.
-    let first = s.f.claim().await.unwrap();
-    let (first_team, _) = s.team_and_kind(&first.job).await;
-    s.f.advance_clock_s(500);
-    s.f.store
-        .release_after_platform_fault(&first.claim, "disk full", s.f.now)
+    let first = sim.f.claim().await.unwrap();
+    let (first_team, _) = sim.team_and_kind(&first.job).await;
+    sim.f.advance_clock_s(500);
+    sim.f
+        .store
+        .release_after_platform_fault(&first.claim, "disk full", sim.f.now)
         .await
         .unwrap();
     for ending in ["shutdown", "killed worker", "expired lease"] {
-        let next =
-            s.f.store
-                .claim("worker", LEASE_S, s.f.now)
-                .await
-                .unwrap()
-                .unwrap();
+        let next = sim
+            .f
+            .store
+            .claim("worker", LEASE_S, sim.f.now)
+            .await
+            .unwrap()
+            .unwrap();
         assert_eq!(
-            s.team_and_kind(&next.job).await.0,
+            sim.team_and_kind(&next.job).await.0,
             first_team,
             "before the {ending}"
         );
         match ending {
             "shutdown" => {
                 assert!(
-                    s.f.store
-                        .heartbeat(&next.claim, 0, 1000, s.f.now)
+                    sim.f
+                        .store
+                        .heartbeat(&next.claim, 0, 1000, sim.f.now)
                         .await
                         .unwrap()
                 );
-                s.f.advance_clock_s(500);
-                s.f.store.release(&next.claim, s.f.now).await.unwrap();
+                sim.f.advance_clock_s(500);
+                sim.f.store.release(&next.claim, sim.f.now).await.unwrap();
             }
             "killed worker" => {
-                assert_eq!(s.f.store.end_leases_of("worker", s.f.now).await.unwrap(), 1);
+                assert_eq!(
+                    sim.f
+                        .store
+                        .end_leases_of("worker", sim.f.now)
+                        .await
+                        .unwrap(),
+                    1
+                );
             }
-            _ => s.f.advance_clock_s(i64::from(LEASE_S)),
+            _ => sim.f.advance_clock_s(i64::from(LEASE_S)),
         }
     }
     // The lost job is claimed again, and only its new lease is charged.
-    let reclaimed = s.f.claim().await.unwrap();
-    let other = s.f.claim().await.unwrap();
+    let reclaimed = sim.f.claim().await.unwrap();
+    let other = sim.f.claim().await.unwrap();
     let teams = [
-        s.team_and_kind(&reclaimed.job).await.0,
-        s.team_and_kind(&other.job).await.0,
+        sim.team_and_kind(&reclaimed.job).await.0,
+        sim.team_and_kind(&other.job).await.0,
     ];
     assert!(teams[0] != teams[1], "{teams:?}");
 }
 
 #[tokio::test]
 async fn slot_time_charged_is_time_used() {
-    let mut s = Slots::new(1).await;
-    s.queue_evaluations(&[("A", 3), ("B", 3)]).await;
+    let mut sim = SlotSimulation::new(1).await;
+    sim.queue_evaluations(&[("A", 3), ("B", 3)]).await;
     // Charged times in ms: that of all shards first, then those of the teams, the largest first.
-    let charged_ms = async |s: &Slots| -> Vec<i64> {
-        let mut connection = s.f.connection().await;
+    let charged_ms = async |sim: &SlotSimulation| -> Vec<i64> {
+        let mut connection = sim.f.connection().await;
         let rows = sqlx::query(
             "SELECT served_ms FROM accounts WHERE lane = 'shard' ORDER BY served_ms DESC",
         );
@@ -530,61 +544,64 @@ async fn slot_time_charged_is_time_used() {
         let accounts: Vec<i64> = rows.iter().map(|row| row.get(0)).collect();
         [vec![of_all_shards], accounts].concat()
     };
-    let before = charged_ms(&s).await;
+    let before = charged_ms(&sim).await;
     // What was charged since then: for all shards, and at most for one team.
-    let newly_charged_ms = async |s: &Slots| {
-        let now = charged_ms(s).await;
+    let newly_charged_ms = async |sim: &SlotSimulation| {
+        let now = charged_ms(sim).await;
         (now[0] - before[0], now[1] - before[1])
     };
-    let (claim, run, shard) = s.f.claim_shard().await;
+    let (claim, run, shard) = sim.f.claim_shard().await;
     assert_eq!(
-        newly_charged_ms(&s).await,
+        newly_charged_ms(&sim).await,
         (15_000, 15_000),
         "a claim is charged its lease"
     );
     for _ in 0..7 {
-        s.f.advance_clock_s(5);
+        sim.f.advance_clock_s(5);
         assert!(
-            s.f.store
-                .heartbeat(&claim, 0, LEASE_S, s.f.now)
+            sim.f
+                .store
+                .heartbeat(&claim, 0, LEASE_S, sim.f.now)
                 .await
                 .unwrap()
         );
     }
-    assert_eq!(newly_charged_ms(&s).await, (50_000, 50_000));
-    s.f.advance_clock_s(3);
+    assert_eq!(newly_charged_ms(&sim).await, (50_000, 50_000));
+    sim.f.advance_clock_s(3);
     assert!(run.keeps_recordings);
-    s.f.commit_shard(&claim, &shard).await;
+    sim.f.commit_shard(&claim, &shard).await;
     assert_eq!(
-        newly_charged_ms(&s).await,
+        newly_charged_ms(&sim).await,
         (38_000, 38_000),
         "a commit leaves the time used"
     );
     // A commit after the lease expired is charged the time used, too.
-    let (claim, _, shard) = s.f.claim_shard().await;
-    s.f.advance_clock_s(100);
-    s.f.commit_shard(&claim, &shard).await;
-    assert_eq!(newly_charged_ms(&s).await, (138_000, 100_000));
+    let (claim, _, shard) = sim.f.claim_shard().await;
+    sim.f.advance_clock_s(100);
+    sim.f.commit_shard(&claim, &shard).await;
+    assert_eq!(newly_charged_ms(&sim).await, (138_000, 100_000));
     // A cancelled job is charged until its cancellation.
-    let (claim, _, _) = s.f.claim_shard().await;
-    s.f.advance_clock_s(4);
-    let evaluation = *s.evaluations.keys().next().unwrap();
-    s.f.store
-        .cancel_evaluation(Actor::Operator, evaluation, "no", s.f.now)
+    let (claim, _, _) = sim.f.claim_shard().await;
+    sim.f.advance_clock_s(4);
+    let evaluation = *sim.evaluations.keys().next().unwrap();
+    sim.f
+        .store
+        .cancel_evaluation(Actor::Operator, evaluation, "no", sim.f.now)
         .await
         .unwrap();
-    s.f.advance_clock_s(4);
-    let is_leased =
-        s.f.store
-            .heartbeat(&claim, 0, LEASE_S, s.f.now)
-            .await
-            .unwrap();
+    sim.f.advance_clock_s(4);
+    let is_leased = sim
+        .f
+        .store
+        .heartbeat(&claim, 0, LEASE_S, sim.f.now)
+        .await
+        .unwrap();
     let expected = if is_leased {
         138_000 + 19_000
     } else {
         138_000 + 4_000
     };
-    assert_eq!(newly_charged_ms(&s).await.0, expected);
+    assert_eq!(newly_charged_ms(&sim).await.0, expected);
 }
 
 #[tokio::test]
@@ -641,16 +658,17 @@ async fn slot_time_is_shared_by_teams_and_job_kinds() {
     for seed in 0..4 {
         let mut random = Random(seed);
         let slots = 1 + seed as usize;
-        let mut s = Slots::new(slots).await;
+        let mut sim = SlotSimulation::new(slots).await;
         let shards = NAMES.map(|name| (name, 5 + random.below(20) as u32));
-        s.queue_evaluations(&shards).await;
-        let teams: Vec<TeamId> = s.teams.keys().copied().collect();
+        sim.queue_evaluations(&shards).await;
+        let teams: Vec<TeamId> = sim.teams.keys().copied().collect();
         for _ in 0..40 {
             let team = teams[random.below(6) as usize];
             let quota = UploadQuota::default();
             let uploaded =
-                s.f.store
-                    .create_submission(Actor::Team(team), team, bundle(), &quota, s.f.now);
+                sim.f
+                    .store
+                    .create_submission(Actor::Team(team), team, bundle(), &quota, sim.f.now);
             uploaded.await.unwrap();
         }
         let durations_s: BTreeMap<(&str, JobKind), i64> = NAMES
@@ -658,16 +676,16 @@ async fn slot_time_is_shared_by_teams_and_job_kinds() {
             .flat_map(|name| [(name, JobKind::Validation), (name, JobKind::Shard)])
             .map(|key| (key, 1 + random.below(MAX_DURATION_S as u64) as i64))
             .collect();
-        s.run(
+        sim.run(
             |team, kind| durations_s.get(&(team, kind)).copied().unwrap_or(1),
             NEVER,
         )
         .await;
         let max_difference = MAX_DURATION_S * (1 + slots as i64);
-        for end in 1..s.job_records.len() {
-            let (before, after) = s.job_records.split_at(end);
+        for end in 1..sim.job_records.len() {
+            let (before, after) = sim.job_records.split_at(end);
             let is_waiting = |kind| after.iter().any(|job| job.kind == kind);
-            let time_s = |kind| Slots::slot_time_s(before, |job| job.kind == kind);
+            let time_s = |kind| SlotSimulation::slot_time_s(before, |job| job.kind == kind);
             if is_waiting(JobKind::Validation) && is_waiting(JobKind::Shard) {
                 let difference = time_s(JobKind::Validation) - time_s(JobKind::Shard);
                 assert!(
@@ -684,7 +702,9 @@ async fn slot_time_is_shared_by_teams_and_job_kinds() {
                             .any(|job| (job.team, job.kind) == (*name, kind))
                     })
                     .map(|name| {
-                        Slots::slot_time_s(before, |job| (job.team, job.kind) == (name, kind))
+                        SlotSimulation::slot_time_s(before, |job| {
+                            (job.team, job.kind) == (name, kind)
+                        })
                     })
                     .collect();
                 let difference = times

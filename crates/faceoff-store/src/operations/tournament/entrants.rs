@@ -49,7 +49,7 @@ async fn check_accepts_entrants(tx: &mut Tx, tournament: &Tournament) -> Result<
     Ok(())
 }
 
-/// Cancels a team's games that have no result, without those of rounds before `played_until`.
+/// Cancels a team's games that have no result. Those of rounds before `played_until` stay: the team still plays them.
 async fn cancel_open_games(
     tx: &mut Tx,
     id: TournamentId,
@@ -70,11 +70,11 @@ async fn cancel_open_games(
             game.state,
             GameState::Played(_) | GameState::Cancelled { .. }
         );
-        let is_kept = matches!(
+        let is_still_played = matches!(
             game.purpose,
             GamePurpose::Round(schedule_entry) if played_until.is_some_and(|until| schedule_entry.round < until)
         );
-        if is_over || is_kept || !game.teams.contains(&team) {
+        if is_over || is_still_played || !game.teams.contains(&team) {
             continue;
         }
         game_lifecycle::cancel(tx, &game, reason).await?;

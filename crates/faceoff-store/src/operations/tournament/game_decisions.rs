@@ -4,7 +4,7 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::{purpose, tournament::game_lifecycle},
+    operations::{job_purpose, tournament::game_lifecycle},
     store::Store,
     tables::{
         entrants::{self, Entrant},
@@ -75,14 +75,14 @@ impl Store {
                             "one of its teams has left the tournament by its round, so the game does not count",
                         );
                     }
-                    purpose::ROUND_GAME
+                    job_purpose::ROUND_GAME
                 }
                 GamePurpose::Test { .. } | GamePurpose::Friendly { .. } => {
                     return StoreError::conflict(
                         "a game that does not count cannot be rerun: request another one",
                     );
                 }
-                GamePurpose::ScheduleReplay { .. } => purpose::SCHEDULE_REPLAY_GAME,
+                GamePurpose::ScheduleReplay { .. } => job_purpose::SCHEDULE_REPLAY_GAME,
             };
             game_lifecycle::enqueue_again(tx, &game, job).await?;
             tx.record(Subject::Game(id), Event::GameQueuedAgain);

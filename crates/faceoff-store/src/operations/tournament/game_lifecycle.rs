@@ -5,9 +5,9 @@ use crate::{
     error::{Result, StoreError},
     event::{Event, Subject},
     operations::{
-        commit::{CommitOutcome, wrong_job},
+        commit_job::{CommitOutcome, wrong_job},
+        job_purpose::JobPurpose,
         jobs::{Job, RunSeeds},
-        purpose::Purpose,
     },
     queue::{self, JobClaim, NewJob, SlotTimeAccount},
     store::Store,
@@ -201,7 +201,7 @@ impl Store {
         now: Timestamp,
     ) -> Result<CommitOutcome> {
         self.commit(claim, now, async |tx, purpose| {
-            let Purpose::Game(id) = purpose else {
+            let JobPurpose::Game(id) = purpose else {
                 return Err(wrong_job("game", &purpose));
             };
             let game = games::find(tx, id).await?;

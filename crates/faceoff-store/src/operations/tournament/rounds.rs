@@ -5,7 +5,7 @@ use crate::{
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
-        purpose,
+        job_purpose,
         tournament::{current_entrants::current_entrants, game_lifecycle},
     },
     store::Store,
@@ -173,10 +173,10 @@ async fn queue_games(
                 let account = match account {
                     Some(account) => account,
                     None => *account.insert(
-                        game_lifecycle::open_account(tx, &game, purpose::ROUND_GAME).await?,
+                        game_lifecycle::open_account(tx, &game, job_purpose::ROUND_GAME).await?,
                     ),
                 };
-                game_lifecycle::enqueue_for(tx, &game, purpose::ROUND_GAME, account).await?;
+                game_lifecycle::enqueue_for(tx, &game, job_purpose::ROUND_GAME, account).await?;
                 count += 1;
             }
         }

@@ -5,7 +5,7 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::{purpose, tournament::game_lifecycle},
+    operations::{job_purpose, tournament::game_lifecycle},
     store::Store,
     tables::{
         entrants,
@@ -33,11 +33,11 @@ async fn counting_games(tx: &mut Tx, id: TournamentId, mut games: Vec<Game>) -> 
         .collect();
     games.retain(|game| {
         let had_left = |team: &TeamId| {
-            let entry_and_departure = game
+            let game_and_departure_rounds = game
                 .purpose
                 .schedule_entry()
                 .zip(departure_rounds.get(team));
-            entry_and_departure
+            game_and_departure_rounds
                 .is_some_and(|(schedule_entry, from_round)| schedule_entry.round >= *from_round)
         };
         matches!(game.state, GameState::Played(_)) && !game.teams.iter().any(had_left)
@@ -110,9 +110,9 @@ impl Store {
                     };
                     let account = match account {
                         Some(account) => account,
-                        None => *account.insert(game_lifecycle::open_account(tx, &game, purpose::SCHEDULE_REPLAY_GAME).await?),
+                        None => *account.insert(game_lifecycle::open_account(tx, &game, job_purpose::SCHEDULE_REPLAY_GAME).await?),
                     };
-                    game_lifecycle::enqueue_for(tx, &game, purpose::SCHEDULE_REPLAY_GAME, account).await?;
+                    game_lifecycle::enqueue_for(tx, &game, job_purpose::SCHEDULE_REPLAY_GAME, account).await?;
                     count += 1;
                 }
             }

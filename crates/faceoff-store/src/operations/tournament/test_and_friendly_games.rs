@@ -6,7 +6,7 @@ use crate::{
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
-        purpose,
+        job_purpose,
         tournament::{current_entrants::current_entrants, game_lifecycle, rounds},
     },
     store::Store,
@@ -128,7 +128,7 @@ impl Store {
                 created_at: now,
                 state: GameState::Queued,
             };
-            game_lifecycle::enqueue(tx, &game, purpose::TEST_OR_FRIENDLY_GAME).await?;
+            game_lifecycle::enqueue(tx, &game, job_purpose::TEST_OR_FRIENDLY_GAME).await?;
             tx.record(
                 Subject::Game(id),
                 Event::TestOrFriendlyGameQueued {
@@ -180,7 +180,7 @@ impl Store {
                 created_at: now,
                 state: GameState::Queued,
             };
-            game_lifecycle::enqueue(tx, &game, purpose::TEST_OR_FRIENDLY_GAME).await?;
+            game_lifecycle::enqueue(tx, &game, job_purpose::TEST_OR_FRIENDLY_GAME).await?;
             let event = Event::TestOrFriendlyGameQueued {
                 team: asked_by,
                 opponent: Some(opponent),

@@ -5,8 +5,8 @@ use crate::{
     error::{Result, StoreError},
     event::{Actor, Event},
     operations::{
-        completion::{self, RunEnd},
-        purpose::{self, Purpose},
+        job_purpose::{self, JobPurpose},
+        run_completion::{self, RunEnd},
         runs,
     },
     queue::{self, ClaimState, JobClaim},
@@ -31,8 +31,8 @@ pub enum CommitOutcome {
     LeaseLost,
 }
 
-/// The error for a claim on one kind of job that is committed as another kind.
-pub(crate) fn wrong_job(expected: &str, purpose: &Purpose) -> StoreError {
+/// The error for a claim that is committed with the result of another kind of job.
+pub(crate) fn wrong_job(expected: &str, purpose: &JobPurpose) -> StoreError {
     StoreError::Conflict(format!(
         "the claim is not on a {expected}, but on {purpose:?}"
     ))
@@ -44,7 +44,7 @@ impl Store {
         &self,
         claim: &JobClaim,
         now: Timestamp,
-        commit: impl AsyncFnOnce(&mut Tx, Purpose) -> Result<()>,
+        commit: impl AsyncFnOnce(&mut Tx, JobPurpose) -> Result<()>,
     ) -> Result<CommitOutcome> {
         let actor = Actor::Worker(claim.holder.clone());
         self.write(actor, now, async |tx| {
@@ -53,10 +53,10 @@ impl Store {
                 ClaimState::AlreadyDone => return Ok(CommitOutcome::AlreadyStored),
                 ClaimState::Lost => return Ok(CommitOutcome::LeaseLost),
             };
-            let purpose = purpose::of_job(tx, claim.job, &kind).await?;
+            let purpose = job_purpose::of_job(tx, claim.job, &kind).await?;
             let progress = match &purpose {
-                Purpose::Shard { shard, .. } => shard.episodes(),
-                Purpose::Validation(_) | Purpose::Game(_) | Purpose::Scoring(_) => 0,
+                JobPurpose::Shard { shard, .. } => shard.episodes(),
+                JobPurpose::Validation(_) | JobPurpose::Game(_) | JobPurpose::Scoring(_) => 0,
             };
             queue::mark_done(tx, claim, progress).await?;
             commit(tx, purpose).await?;
@@ -78,7 +78,7 @@ impl Store {
         now: Timestamp,
     ) -> Result<CommitOutcome> {
         self.commit(claim, now, async |tx, purpose| match purpose {
-            Purpose::Shard { run, shard } => store_shard(tx, run, &shard, &commit).await,
+            JobPurpose::Shard { run, shard } => store_shard(tx, run, &shard, &commit).await,
             other => Err(wrong_job("shard", &other)),
         })
         .await
@@ -104,9 +104,9 @@ async fn store_shard(tx: &mut Tx, id: RunId, shard: &Shard, commit: &ShardCommit
     );
     let sums = shards::sums(tx, id).await?;
     if commit.stopped_by_faults || sums.agent_faults > i64::from(run.plan.max_faults) {
-        completion::end_run(tx, id, owner, RunEnd::AgentFailed).await
+        run_completion::end_run(tx, id, owner, RunEnd::AgentFailed).await
     } else if sums.open == 0 {
-        completion::end_run(tx, id, owner, RunEnd::Completed).await
+        run_completion::end_run(tx, id, owner, RunEnd::Completed).await
     } else {
         Ok(())
     }

@@ -5,10 +5,9 @@ use crate::{
     error::Result,
     event::{Event, Subject},
     operations::{
-        commit::{CommitOutcome, wrong_job},
-        completion,
-        purpose::Purpose,
-        release_day,
+        commit_job::{CommitOutcome, wrong_job},
+        job_purpose::JobPurpose,
+        release_day, run_completion,
     },
     queue::JobClaim,
     store::Store,
@@ -34,13 +33,13 @@ impl Store {
     ) -> Result<CommitOutcome> {
         let dataset_bytes = self.artifacts().size_bytes(dataset).await?;
         self.commit(claim, now, async |tx, purpose| match purpose {
-            Purpose::Scoring(EvaluationRun { id, proposal, .. }) => {
+            JobPurpose::Scoring(EvaluationRun { id, proposal, .. }) => {
                 evaluations::set_finished(tx, id, result, dataset, dataset_blake3, now).await?;
                 if let Some(dataset_bytes) = dataset_bytes {
                     retentions::set_dataset_bytes(tx, id, dataset_bytes).await?;
                 }
                 if let Some(proposal) = proposal {
-                    return completion::record_proposal_end(tx, proposal).await;
+                    return run_completion::record_proposal_end(tx, proposal).await;
                 }
                 let event = Event::EvaluationFinished {
                     score: result.score,

@@ -16,7 +16,7 @@ pub struct RunPlan {
     pub episodes_per_shard: u32,
     /// The run ends without a score after more agent faults than this in all its shards.
     pub max_faults: u32,
-    /// Differences from the ruleset.
+    /// The stage's deviations from the constants of the ruleset.
     pub variation: Variation,
     /// Limits of agents that override the server's configuration.
     pub limits: Box<StageLimits>,

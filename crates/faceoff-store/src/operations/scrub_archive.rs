@@ -1,6 +1,6 @@
-//! Scrubbing: removal of everything from a copied database that its archive must not contain. An archive has two
-//! editions: the public one, and one for the organisers. Triggers are off meanwhile, and references between rows are
-//! checked at the end.
+//! Scrubbing: removal of everything from a copied database that its archive (the season in one file) must not contain. An archive
+//! has two editions: the public one, and one for the organisers. The database's triggers are dropped meanwhile, since they would
+//! refuse some of these changes. References between rows are checked at the end.
 
 use crate::{
     error::{Result, StoreError},
@@ -168,7 +168,7 @@ pub(crate) async fn scrub(
     }
     if edition == Edition::Public {
         check_summarised(connection, summary_version).await?;
-        forget_lifted_disqualifications(connection).await?;
+        remove_lifted_disqualifications(connection).await?;
         keep_public_events(connection).await?;
     }
     for (scope, sql) in STEPS {
@@ -249,7 +249,7 @@ async fn check_summarised(connection: &mut SqliteConnection, version: u32) -> Re
 }
 
 /// Removes disqualifications that were lifted. A disqualification is a public event, a reinstatement is not.
-async fn forget_lifted_disqualifications(connection: &mut SqliteConnection) -> Result<()> {
+async fn remove_lifted_disqualifications(connection: &mut SqliteConnection) -> Result<()> {
     sqlx::query(
         "DELETE FROM events WHERE kind = 'team_disqualified' AND EXISTS
            (SELECT 1 FROM events r WHERE r.kind = 'team_reinstated' AND r.subject_kind = events.subject_kind

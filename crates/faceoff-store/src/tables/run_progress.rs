@@ -33,10 +33,10 @@ impl RunProgress {
         let minute = TimestampRound::new()
             .smallest(Unit::Minute)
             .mode(jiff::RoundMode::Floor);
-        let begin = now.round(minute).unwrap_or(now);
+        let start_of_minute = now.round(minute).unwrap_or(now);
         self.commits
             .iter()
-            .filter(|shard| shard.committed_at < begin)
+            .filter(|shard| shard.committed_at < start_of_minute)
             .map(|shard| shard.episodes)
             .sum()
     }

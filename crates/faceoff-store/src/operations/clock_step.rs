@@ -1,23 +1,24 @@
-//! Due times of jobs and webhook deliveries when the clock is set.
+//! A *clock step*: the system clock of the host is set. Due times of jobs and webhook deliveries move with it once an organiser
+//! accepts the step.
 
 use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::rerun::RERUN_PAUSES_S,
+    operations::rerun_evaluation::RERUN_PAUSES_S,
     queue,
     store::Store,
     tables::deliveries,
 };
 use jiff::{SignedDuration, Timestamp};
 
-/// No delivery waits longer for its next attempt, with some reserve.
+/// No delivery waits longer than this for its next attempt; the longest actual pause is shorter.
 const LONGEST_DELIVERY_PAUSE: SignedDuration = SignedDuration::from_hours(24);
 
 impl Store {
     /// Moves leases, due times of jobs and due times of webhook deliveries, since the clock is about to be moved by `by`.
     /// `accept` moves the clock before the transaction is committed; no job is claimed in between. `now` is the time
-    /// afterwards. [`StoreError::Conflict`], and no change, if `accept` returns false.
+    /// afterwards, `size` the text for the event. [`StoreError::Conflict`], and no change, if `accept` returns false.
     #[boxed]
     pub async fn accept_clock_step(
         &self,

@@ -6,7 +6,7 @@ use crate::{
     error::{Result, StoreError},
     free_space::FreeSpace,
     health_probes::HealthProbes,
-    operations::scrub::scrub,
+    operations::scrub_archive::scrub,
     signals::Signals,
     store::Store,
     tables::{

@@ -3,7 +3,7 @@
 use crate::{
     boxed, column,
     error::{Result, StoreError},
-    operations::scrub::check_references,
+    operations::scrub_archive::check_references,
     schema::MIGRATIONS,
     store::Store,
     tables::archive::{self, ArchivedSeason},

@@ -5,7 +5,7 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::completion,
+    operations::run_completion,
     store::Store,
     tables::{
         counting_evaluations, days,
@@ -67,7 +67,7 @@ async fn end_day(tx: &mut Tx, stage_day: StageDay) -> Result<u32> {
         },
     );
     for evaluation in unfinished {
-        completion::fail_evaluation(tx, evaluation, Failure::DeadlineMissed(&reason)).await?;
+        run_completion::fail_evaluation(tx, evaluation, Failure::DeadlineMissed(&reason)).await?;
     }
     Ok(unfinished_count)
 }

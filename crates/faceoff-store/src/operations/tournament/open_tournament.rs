@@ -24,6 +24,7 @@ use jiff::Timestamp;
 /// A tournament to be opened.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NewTournament {
+    /// Tournaments have the same type of name as stages.
     pub name: StageName,
     /// Stage whose results the entrants were selected by, if any.
     pub stage: Option<StageId>,

@@ -4,7 +4,7 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::purpose,
+    operations::job_purpose,
     queue,
     store::Store,
     tables::{
@@ -67,7 +67,7 @@ impl Store {
     /// [`StoreError::SeasonClosed`](crate::StoreError::SeasonClosed) once the season is over;
     /// [`DailyQuotaExceeded`](crate::StoreError::DailyQuotaExceeded) or
     /// [`StorageQuotaExceeded`](crate::StoreError::StorageQuotaExceeded) beyond the team's quota;
-    /// [`KeyUsed`](crate::StoreError::KeyUsed) if another bundle was uploaded with the key.
+    /// [`IdempotencyKeyUsed`](crate::StoreError::IdempotencyKeyUsed) if another bundle was uploaded with the key.
     #[boxed]
     pub async fn create_submission_once(
         &self,
@@ -85,7 +85,7 @@ impl Store {
                 if earlier.bundle.blake3 == bundle.blake3 {
                     return Ok(earlier);
                 }
-                return Err(StoreError::KeyUsed {
+                return Err(StoreError::IdempotencyKeyUsed {
                     submission: earlier.id,
                 });
             }
@@ -98,8 +98,8 @@ impl Store {
             let id = SubmissionId::new();
             submissions::insert(tx, id, team, &bundle, key, now).await?;
             let account =
-                queue::open_account(tx, purpose::VALIDATION.lane, &team.to_string()).await?;
-            let job = queue::insert(tx, purpose::VALIDATION, account).await?;
+                queue::open_account(tx, job_purpose::VALIDATION.lane, &team.to_string()).await?;
+            let job = queue::insert(tx, job_purpose::VALIDATION, account).await?;
             validation_runs::insert(tx, id, job).await?;
             let event = Event::SubmissionUploaded {
                 team,

@@ -4,7 +4,7 @@ use crate::{
     boxed,
     error::{Result, StoreError},
     event::Actor,
-    operations::completion,
+    operations::run_completion,
     queries,
     store::Store,
     tables::evaluations::Failure,
@@ -28,7 +28,7 @@ impl Store {
             if evaluation.state.is_over() {
                 return StoreError::conflict("the evaluation is over already");
             }
-            completion::fail_evaluation(tx, id, Failure::Cancelled(reason)).await
+            run_completion::fail_evaluation(tx, id, Failure::Cancelled(reason)).await
         })
         .await
     }

@@ -5,7 +5,7 @@ use crate::{
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     store::Store,
-    tables::{decision_records::DecisionRecord, freezes, stages},
+    tables::{board_freezes, decision_records::DecisionRecord, stages},
 };
 use faceoff_types::StageId;
 use jiff::Timestamp;
@@ -23,7 +23,7 @@ impl Store {
     ) -> Result<()> {
         self.write(actor, now, async |tx| {
             stages::find(tx, stage).await?;
-            if let Some(frozen) = freezes::find(tx, stage).await? {
+            if let Some(frozen) = board_freezes::find(tx, stage).await? {
                 return StoreError::conflict(format!(
                     "the boards of the stage are frozen already, since {}",
                     frozen.at
@@ -33,7 +33,7 @@ impl Store {
                 at: now,
                 reason: reason.to_owned(),
             };
-            freezes::insert(tx, stage, &decision).await?;
+            board_freezes::insert(tx, stage, &decision).await?;
             let reason = decision.reason;
             tx.record(Subject::Stage(stage), Event::BoardsFrozen { reason });
             Ok(())
@@ -51,10 +51,10 @@ impl Store {
     ) -> Result<()> {
         self.write(actor, now, async |tx| {
             stages::find(tx, stage).await?;
-            if freezes::find(tx, stage).await?.is_none() {
+            if board_freezes::find(tx, stage).await?.is_none() {
                 return StoreError::conflict("the boards of the stage are not frozen");
             }
-            freezes::remove(tx, stage).await?;
+            board_freezes::remove(tx, stage).await?;
             tx.record(Subject::Stage(stage), Event::BoardsUnfrozen);
             Ok(())
         })
@@ -64,12 +64,12 @@ impl Store {
     /// All stages with frozen boards, with time and reason.
     #[boxed]
     pub async fn frozen_boards(&self) -> Result<Vec<(StageId, DecisionRecord)>> {
-        freezes::all(&mut *self.database.read.acquire().await?).await
+        board_freezes::all(&mut *self.database.read.acquire().await?).await
     }
 
     /// Time and reason of a stage's board freeze; `None` if its boards are not frozen.
     #[boxed]
     pub async fn board_freeze(&self, stage: StageId) -> Result<Option<DecisionRecord>> {
-        freezes::find(&mut *self.database.read.acquire().await?, stage).await
+        board_freezes::find(&mut *self.database.read.acquire().await?, stage).await
     }
 }

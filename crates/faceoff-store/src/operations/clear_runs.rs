@@ -1,4 +1,5 @@
-//! Clearing of old runs: their shards (rows with the outcomes of a part of the episodes) are removed from the database.
+//! Clearing of old runs: their shards (rows with the outcomes of a part of the episodes) are removed from the database, which would
+//! grow without bound otherwise.
 //! A run's summary and its dataset remain.
 
 use crate::{

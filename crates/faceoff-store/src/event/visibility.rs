@@ -3,9 +3,9 @@
 use super::Event;
 
 impl Event {
-    /// Is the event public with all of its fields? The fields of a public event are also shown on a public page: a board,
-    /// an evaluation's page, the announcements or the season's page. An event of a single evaluation is public only if the
-    /// evaluation is.
+    /// Is an event of this kind public with all of its fields? The fields of a public event are also shown on a public page: a
+    /// board, an evaluation's page, the announcements or the season's page. An event of a single evaluation is public only if
+    /// the evaluation is, too; this function does not check that.
     #[must_use]
     pub const fn is_public(&self) -> bool {
         match self {

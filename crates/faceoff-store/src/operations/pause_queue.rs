@@ -40,7 +40,7 @@ impl Store {
             }
             season::set_paused(tx, None).await?;
             tx.record(Subject::Season, Event::QueueResumed);
-            queue::resume(tx);
+            queue::wake_workers(tx);
             Ok(())
         })
         .await

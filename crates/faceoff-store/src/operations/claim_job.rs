@@ -6,11 +6,10 @@ use crate::{
     error::{Result, StoreError},
     event::{Actor, Subject},
     operations::{
-        completion,
+        job_purpose::{self, JobFilter, JobPurpose},
         jobs::{ClaimedJob, Job, RunSeeds},
         lease_release::give_up,
-        purpose::{self, JobFilter, Purpose},
-        runs,
+        run_completion, runs,
         tournament::game_lifecycle,
     },
     queue::{self, JobClaim, LeasedJob},
@@ -71,14 +70,14 @@ impl Store {
                     format!("{MAX_LEASES} workers died while running it")
                 } else {
                     match describe_job(tx, &leased, worker).await {
-                        // It waits outside the queue until it may start.
+                        // A game of a paused tournament: it waits, without a lease, until the tournament is resumed.
                         Ok(None) => {
                             queue::park(tx, leased.id.0).await?;
                             continue;
                         }
                         Ok(Some(job)) => {
                             if leased.attempts > 1 {
-                                // Ends of leases are no events of their own: this line tells why a job runs once more.
+                                // The end of a lease is not logged: this line shows that a job runs once more.
                                 tracing::info!(job = %leased.id.0, attempt = leased.attempts, "a job is leased again");
                             }
                             let lease = SignedDuration::from_secs(lease_s.into());
@@ -107,15 +106,15 @@ impl Store {
     }
 }
 
-/// Reads the rows that a leased job refers to. `None`: the job must not start now.
+/// Reads the rows that a leased job refers to. `None`: the job must not start now, because its tournament is paused.
 async fn describe_job(tx: &mut Tx, leased: &LeasedJob, worker: &str) -> Result<Option<Job>> {
     let retries = leased.attempts.saturating_sub(1);
-    let job = match purpose::of_job(tx, leased.id.0, &leased.kind).await? {
-        Purpose::Game(id) => {
+    let job = match job_purpose::of_job(tx, leased.id.0, &leased.kind).await? {
+        JobPurpose::Game(id) => {
             tx.record_progress(Subject::Game(id));
             return game_lifecycle::begin(tx, id, worker, retries).await;
         }
-        Purpose::Validation(id) => {
+        JobPurpose::Validation(id) => {
             tx.record_progress(Subject::Submission(id));
             let submission = submissions::find(tx, id).await?;
             let secret = season::read(tx).await?.secret;
@@ -145,11 +144,11 @@ async fn describe_job(tx: &mut Tx, leased: &LeasedJob, worker: &str) -> Result<O
                 runtimes,
             })
         }
-        Purpose::Shard { run: id, shard } => {
+        JobPurpose::Shard { run: id, shard } => {
             let owner = runs::find_owner(tx, id).await?;
             let (run, seeds) = read_run(tx, id).await?;
             let submission = single_contestant(tx, id).await?;
-            completion::record_run_start(tx, id, owner).await?;
+            run_completion::record_run_start(tx, id, owner).await?;
             tx.record_progress(owner.subject());
             Ok(Job::Shard {
                 owner,
@@ -160,7 +159,7 @@ async fn describe_job(tx: &mut Tx, leased: &LeasedJob, worker: &str) -> Result<O
                 platform_retries: retries,
             })
         }
-        Purpose::Scoring(evaluation) => {
+        JobPurpose::Scoring(evaluation) => {
             tx.record_progress(evaluation.owner().subject());
             describe_scoring(tx, evaluation.id, evaluation.run).await
         }
@@ -196,7 +195,7 @@ async fn read_run(tx: &mut Tx, id: RunId) -> Result<(Run, RunSeeds)> {
     Ok((run, seeds))
 }
 
-/// The submission that plays a run of tasks alone.
+/// The submission of a run. A run has exactly one, although the table of contestants could hold several.
 async fn single_contestant(tx: &mut Tx, run: RunId) -> Result<Submission> {
     let contestants: Vec<SubmissionId> = run_rows::contestants(tx, run).await?;
     match contestants[..] {

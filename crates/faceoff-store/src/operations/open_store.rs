@@ -15,8 +15,7 @@ use std::{fs::File, path::Path, sync::Arc};
 
 impl Store {
     /// Opens `data_dir/faceoff.sqlite3` and `data_dir/artifacts`, creating and migrating them as
-    /// needed. On the first start it draws the season's
-    /// secret, from which all seeds are derived.
+    /// needed. On the first start it draws the season's secret, from which all seeds are derived.
     #[boxed]
     pub async fn open(data_dir: &Path) -> Result<Self> {
         // Two processes that start at the same time must not both migrate.

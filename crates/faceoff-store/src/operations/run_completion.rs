@@ -4,7 +4,7 @@ use crate::{
     error::{Result, StoreError},
     event::{Event, Subject},
     operations::{
-        purpose, release_day, rerun,
+        job_purpose, release_day, rerun_evaluation,
         runs::{self, RunOwner},
     },
     queue,
@@ -39,7 +39,8 @@ pub(crate) async fn record_run_start(tx: &mut Tx, run: RunId, owner: RunOwner) -
     Ok(())
 }
 
-/// Ends a run. Its owner gets the next step (scoring, or its end).
+/// Ends a run, and continues with its owner. The scoring of an evaluation is queued after a complete run; an ablation is finished
+/// after the last of its runs. Otherwise the owner ends without a result.
 pub(crate) async fn end_run(
     tx: &mut Tx,
     run: RunId,
@@ -80,9 +81,13 @@ pub(crate) async fn end_run(
 }
 
 async fn queue_scoring(tx: &mut Tx, id: EvaluationId) -> Result<()> {
-    let account =
-        queue::open_account(tx, purpose::SCORING.lane, purpose::PLATFORM_ACCOUNT_OWNER).await?;
-    let job = queue::insert(tx, purpose::SCORING, account).await?;
+    let account = queue::open_account(
+        tx,
+        job_purpose::SCORING.lane,
+        job_purpose::PLATFORM_ACCOUNT_OWNER,
+    )
+    .await?;
+    let job = queue::insert(tx, job_purpose::SCORING, account).await?;
     scorings::insert(tx, id, job).await
 }
 
@@ -116,7 +121,10 @@ pub(crate) async fn fail_evaluation(
     };
     tx.record(Subject::Evaluation(id), event);
     if let Failure::Platform(_) = failure {
-        log_damage(id, rerun::rerun_after_platform_fault(tx, id).await)?;
+        log_damage(
+            id,
+            rerun_evaluation::rerun_after_platform_fault(tx, id).await,
+        )?;
     }
     log_damage(id, release_day::release_if_over(tx, id).await)
 }

@@ -15,7 +15,8 @@ use faceoff_types::{GameId, RunId, SubmissionId};
 use sqlx::SqliteConnection;
 use uuid::Uuid;
 
-/// Kind of a job. The queue stores its name, which may be that of an earlier version.
+/// Kind of a job. The queue stores its name. Some names are those of earlier versions: `smoke` for a validation run, `finalise` for
+/// scoring.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum JobKind {
     Validation,
@@ -59,7 +60,8 @@ const fn lane(name: &'static str, urgency: u32, tie_breaker: u32) -> Lane {
 //
 // The lanes are in three levels of urgency. Level 0: scoring, which runs no agent and ends an evaluation. Level 1: validation
 // runs, shards and games of rounds share the slots equally, so that none delays the others for long. Level 2: ablations,
-// proposals and all other games, which do not count, get the remaining slots.
+// proposals and all other games, which do not count, get the remaining slots. The stored name of a lane may be that of an
+// earlier version, too: `free_game` is for test games and friendly games.
 pub(crate) const SCORING: NewJob = JobKind::Scoring.in_lane(lane("finalise", 0, 0));
 pub(crate) const VALIDATION: NewJob = JobKind::Validation.in_lane(lane("smoke", 1, 0));
 pub(crate) const SHARD: NewJob = JobKind::Shard.in_lane(lane("shard", 1, 1));
@@ -73,12 +75,14 @@ pub(crate) const PROPOSAL_SHARD: NewJob = JobKind::Shard.in_lane(lane("proposal"
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum JobFilter {
     All,
+    /// For remote workers. Shards of ablations and proposals, and games that do not count, are included.
     ShardsAndGames,
+    /// For the server's own worker, if remote workers run all other jobs.
     ValidationAndScoring,
 }
 
 impl JobFilter {
-    /// Stored names of the lanes, as a JSON array.
+    /// Stored names of the lanes in which these jobs wait, as a JSON array.
     pub(crate) const fn lanes(self) -> &'static str {
         match self {
             Self::All => {
@@ -97,33 +101,33 @@ pub(crate) const PLATFORM_ACCOUNT_OWNER: &str = "";
 
 /// The submission, game, shard or evaluation that a job is for.
 #[derive(Debug)]
-pub(crate) enum Purpose {
+pub(crate) enum JobPurpose {
     Validation(SubmissionId),
     Game(GameId),
     Shard { run: RunId, shard: Shard },
     Scoring(EvaluationRun),
 }
 
-/// Purpose of a job, from its stored kind and the row that refers to it.
+/// The purpose of a job, from its stored kind and the row that refers to it.
 pub(crate) async fn of_job(
     connection: &mut SqliteConnection,
     job: Uuid,
     stored_kind: &str,
-) -> Result<Purpose> {
+) -> Result<JobPurpose> {
     let purpose = match JobKind::ALL
         .into_iter()
         .find(|kind| kind.stored_name() == stored_kind)
     {
         Some(JobKind::Validation) => validation_runs::of_job(connection, job)
             .await?
-            .map(Purpose::Validation),
-        Some(JobKind::Game) => games::of_job(connection, job).await?.map(Purpose::Game),
+            .map(JobPurpose::Validation),
+        Some(JobKind::Game) => games::of_job(connection, job).await?.map(JobPurpose::Game),
         Some(JobKind::Shard) => shards::of_job(connection, job)
             .await?
-            .map(|(run, shard)| Purpose::Shard { run, shard }),
+            .map(|(run, shard)| JobPurpose::Shard { run, shard }),
         Some(JobKind::Scoring) => evaluation_runs::of_scoring_job(connection, job)
             .await?
-            .map(Purpose::Scoring),
+            .map(JobPurpose::Scoring),
         None => None,
     };
     purpose.ok_or_else(|| {
