@@ -58,7 +58,7 @@ pub enum AgentFaultKind {
     ClosedOutput,
     /// The process ended while an answer was due.
     Exited { code: i32 },
-    /// The process was ended by a signal that the evaluator did not send.
+    /// The process was ended by a signal that the evaluator (the program that plays the episodes) did not send.
     Signalled { signal: i32 },
     /// The process was ended because it exceeded a resource limit.
     LimitExceeded {
