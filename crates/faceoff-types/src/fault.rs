@@ -4,7 +4,7 @@ use crate::AgentTask;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// What an agent did wrong (PROTOCOL, "Agent faults"). A platform fault has a different type, in the crate
+/// What an agent did wrong (docs/protocol.md, "Faults"). A platform fault has a different type, in the crate
 /// where it arises, and is never converted into one of these.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]

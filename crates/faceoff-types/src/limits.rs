@@ -16,7 +16,7 @@ pub struct AgentLimits {
     pub time: TimeLimits,
 }
 
-/// Limits of a bundle (PROTOCOL, "Bundle").
+/// Limits of a bundle (docs/protocol.md, "A bundle").
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(default, deny_unknown_fields)]
@@ -82,7 +82,7 @@ impl Default for ResourceLimits {
     }
 }
 
-/// How long an agent may take (PROTOCOL, "Time"), in seconds.
+/// How long an agent may take (docs/protocol.md, "Time"), in seconds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(default, deny_unknown_fields)]

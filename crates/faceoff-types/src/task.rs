@@ -3,7 +3,7 @@
 use crate::short_name::short_name;
 use indexmap::IndexMap;
 
-/// The length of a control step of air hockey, in seconds (docs/rules.md, "Stages"). Other competitions have their own.
+/// The length of a control step of air hockey, in seconds (docs/rules.md, "What is played"). Other competitions have their own.
 pub const CONTROL_STEP_S: f64 = 0.02;
 
 /// Control steps of the longest episode of air hockey.

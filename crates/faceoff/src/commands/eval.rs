@@ -269,7 +269,7 @@ impl EvalCommand {
         // The process may be restricted to some of the machine's CPUs.
         let cpus = affinity::allowed_cpus().context("reading the CPU affinity of this process")?;
         let layout = CpuLayout::divide(&cpus, workers, 1);
-        if layout.shared && workers > 1 {
+        if layout.agents_share_cpus && workers > 1 {
             self.notes().print(format_args!(
                 "note: {workers} workers share {} CPUs; results do not change, but computation \
                 times may be longer",

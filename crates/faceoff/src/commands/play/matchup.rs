@@ -127,7 +127,7 @@ fn environments(
 ) -> anyhow::Result<[AgentEnvironment; 2]> {
     let cpus = affinity::allowed_cpus().context("reading the CPU affinity of this process")?;
     let layout = CpuLayout::divide(&cpus, 1, 2);
-    if layout.shared && !options.json {
+    if layout.agents_share_cpus && !options.json {
         println!(
             "note: the agents share {} CPUs with each other and the simulator; answers may take longer, but \
             time lost to other processes is measured separately",
