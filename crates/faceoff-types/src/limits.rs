@@ -136,8 +136,9 @@ impl TimeLimits {
     /// Upper bound of every wait for an agent.
     pub const MAX_WAIT: Duration = Duration::from_secs(3600);
 
-    /// The longest time for which an agent can occupy a slot, in seconds: the sum of its budgets for `episodes`
-    /// episodes of at most `longest_episode_s` (simulated time) in `shards` shards, with a restart after each of `max_faults` faults. Host interference comes on top.
+    /// The longest time for which an agent can occupy a slot, in seconds: the sum of its budgets for `episodes` episodes of at most
+    /// `longest_episode_s` (simulated time) in `shards` shards, with a restart after each of `max_faults` faults. Host interference
+    /// comes on top.
     #[must_use]
     pub fn max_slot_time_s(
         &self,

@@ -118,8 +118,7 @@ impl CpuLayout {
             .filter(|cpu| !agents.contains(cpu))
             .collect();
         let (simulators, server_cpus) = if not_for_agents.len() > slots {
-            let (server_cpus, simulators) =
-                not_for_agents.split_at(not_for_agents.len() - slots);
+            let (server_cpus, simulators) = not_for_agents.split_at(not_for_agents.len() - slots);
             (
                 simulators.iter().map(|cpu| vec![*cpu]).collect(),
                 server_cpus,

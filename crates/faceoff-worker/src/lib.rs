@@ -29,8 +29,8 @@ mod schedule;
 mod scorer;
 mod scratch;
 mod server;
-mod slot_supervisor;
 mod slot;
+mod slot_supervisor;
 mod slot_threads;
 #[cfg(test)]
 mod tests;

@@ -251,7 +251,11 @@ pub(crate) async fn run_slots(
 }
 
 /// Starts a slot's thread. The receiver gets a value at its normal end, and an error if it panics.
-fn start_thread(threads: &SlotThreads, index: usize, slot: Slot) -> anyhow::Result<oneshot::Receiver<()>> {
+fn start_thread(
+    threads: &SlotThreads,
+    index: usize,
+    slot: Slot,
+) -> anyhow::Result<oneshot::Receiver<()>> {
     let (ended, end) = oneshot::channel();
     threads
         .start(format!("faceoff-slot-{index}"), move || {

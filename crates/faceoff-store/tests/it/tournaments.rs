@@ -212,7 +212,10 @@ async fn round_starts_once_and_ends_with_its_last_game() {
     let [a, b, c] = teams[..] else { panic!() };
     assert_eq!(cup.number, 1);
     let first = drawn(1, &[&[[a, b]], &[[b, c]], &[[c, a]]], &[c, a, b]);
-    let (one, two) = tokio::join!(start_round(&f, cup.id, &first), start_round(&f, cup.id, &first));
+    let (one, two) = tokio::join!(
+        start_round(&f, cup.id, &first),
+        start_round(&f, cup.id, &first)
+    );
     let lost = if one.is_ok() { two } else { one };
     assert_conflict(lost, &["round 1 has started already"]);
     assert_conflict(
@@ -322,7 +325,10 @@ async fn round_needs_a_valid_submission_of_each_team() {
         None,
         "before the first round it is only removed"
     );
-    assert_conflict(start_round(&f, cup.id, &round).await, &["have changed meanwhile"]);
+    assert_conflict(
+        start_round(&f, cup.id, &round).await,
+        &["have changed meanwhile"],
+    );
     let two = drawn(1, &[&[[teams[0], teams[1]]]], &[]);
     start_round(&f, cup.id, &two).await.unwrap();
     assert_conflict(

@@ -7,7 +7,7 @@ use super::{
     published_jobs::PublishedJobs,
     streams::Streams,
 };
-use crate::{game_broadcast::show_update, local::claim};
+use crate::{game_broadcast::show_update, local::to_claim};
 use async_nats::{Client, Message};
 use faceoff_live::{LiveState, SlotReport, WorkerInfo};
 use faceoff_store::{Store, StoreError};

@@ -47,7 +47,12 @@ async fn tournament_survives_killed_servers() {
 
     let id = tournament.to_string();
     for events_to_live in [1, 2, 3, 5, 8, 13, 21, 13, 8, 5, 3, 2] {
-        let seen_events = run_and_kill(&server, "games_killed::child_process_plays_games", &id, events_to_live);
+        let seen_events = run_and_kill(
+            &server,
+            "games_killed::child_process_plays_games",
+            &id,
+            events_to_live,
+        );
         assert_eq!(seen_events, events_to_live, "the child ended early");
     }
     let worker = server.start_worker(2);

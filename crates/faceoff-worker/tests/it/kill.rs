@@ -45,7 +45,12 @@ async fn killed_evaluation_has_the_same_result() {
 
     let id = killed.id.to_string();
     for events_to_live in [1, 2, 3, 1, 4, 2] {
-        let seen_events = run_and_kill(&server, "kill::child_process_runs_evaluation", &id, events_to_live);
+        let seen_events = run_and_kill(
+            &server,
+            "kill::child_process_runs_evaluation",
+            &id,
+            events_to_live,
+        );
         let over = server
             .store
             .evaluation(killed.id)

@@ -16,7 +16,7 @@ use tempfile::TempDir;
 pub(super) struct Matchup {
     bundles: [Bundle; 2],
     envs: [AgentEnvironment; 2],
-    /// Settings of a game; each game replaces the seed.
+    /// Settings of a game; each game has its own seed in place of this one's.
     spec: GameSpec,
     /// Holds the unpacked bundles.
     _scratch: TempDir,
