@@ -250,7 +250,6 @@ async fn migration_takes_missing_creators_from_the_event_log() {
             .rotate_token(actor, token, [hash; 32], requester, f.now);
         rotated.await.unwrap();
     }
-    // An earlier version's password link was valid for 90 days; the migration shortens it to one day.
     let link = |code| NewInvitation {
         code_hash: [code; 32],
         role: InvitationRole::PasswordReset(first),
@@ -261,7 +260,7 @@ async fn migration_takes_missing_creators_from_the_event_log() {
     let link = f.store.invite(Actor::User(second), link(30), f.now).await;
     let link = link.unwrap();
 
-    // An earlier version did not store the creators. The migration that added them reads them from the log of events.
+    // As an earlier version left them. The migration takes the creators from the log of events, and limits password links to a day.
     let mut connection = f.connection().await;
     let mut execute = async |sql: &str| {
         sqlx::raw_sql(sqlx::AssertSqlSafe(sql.to_owned()))
@@ -423,7 +422,6 @@ async fn ended_credentials_are_deleted_after_a_month() {
             .id
     };
     let root = create(&f, 1, None).await;
-    // Each of these is created with the token before it.
     let child = create(&f, 2, Some((root, [1; 32]))).await;
     let grandchild = create(&f, 9, Some((child, [2; 32]))).await;
     let leaf = create(&f, 3, Some((grandchild, [9; 32]))).await;
@@ -433,8 +431,7 @@ async fn ended_credentials_are_deleted_after_a_month() {
             .await
             .unwrap();
     }
-    // The operator's token, whose secret is in a file of the data folder, stays although it is revoked: if it were deleted, the next
-    // start of the server would make the file's secret valid again.
+    // The revoked operator's token stays: if it were deleted, the next start would make its secret, which is in a file, valid again.
     assert!(f.store.set_operator_token([7; 32], f.now).await.unwrap());
     let of_operator = f.store.verify_token([7; 32], TokenKind::ApiToken, f.now);
     let of_operator = of_operator.await.unwrap().unwrap().token.id;
@@ -465,7 +462,7 @@ async fn ended_credentials_are_deleted_after_a_month() {
         .await
         .unwrap();
 
-    // The two revoked tokens are deleted after 30 days, the expired token and invitation an hour later, since they ended an hour later.
+    // The two revoked tokens are deleted after 30 days. Token and invitation that expired an hour later follow an hour later.
     f.advance_clock_s(30 * 24 * 3600 - 1);
     assert_eq!(f.store.delete_ended_credentials(f.now).await.unwrap(), 0);
     f.advance_clock_s(1);
