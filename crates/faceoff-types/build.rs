@@ -10,11 +10,12 @@ use unicode_security::confusable_detection::skeleton;
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed=build.rs");
     let mut characters = Vec::new();
+    // For each character, where its prototype (the text that it looks like) ends in `prototypes`.
     let mut ends = Vec::new();
     let mut prototypes = String::new();
     for c in '\u{1}'..=char::MAX {
         let text = c.to_string();
-        // Others are decomposed before they are looked up.
+        // Characters with a decomposition never occur: texts are decomposed (NFD) before their characters are looked up.
         if !text.nfd().eq([c]) {
             continue;
         }

@@ -85,7 +85,7 @@ impl fmt::Debug for ActionLayout {
 }
 
 impl ActionSpace {
-    /// The layout that agents have if they need not state one.
+    /// The layout of all agents; `None` if each agent chooses its layout.
     #[must_use]
     pub fn only_layout(&self) -> Option<ActionLayout> {
         let first = || self.layouts.first().copied();
@@ -139,7 +139,7 @@ mod tests {
 
     #[test]
     fn layouts_are_found_by_code_and_by_text() {
-        let stated = ActionSpace {
+        let several_layouts = ActionSpace {
             agents_choose_layout: true,
             layouts: vec![
                 ActionLayout::new(Some(1), &[2]),
@@ -147,15 +147,15 @@ mod tests {
                 ActionLayout::new(None, &[4, 3, 2]),
             ],
         };
-        assert_eq!(stated.codes_text(), "1, -1 or null");
-        assert_eq!(stated.only_layout(), None);
+        assert_eq!(several_layouts.codes_text(), "1, -1 or null");
+        assert_eq!(several_layouts.only_layout(), None);
         for (text, len) in [("1", 2), ("-1", 6), ("null", 24)] {
-            let layout = stated.parse(text).unwrap();
+            let layout = several_layouts.parse(text).unwrap();
             assert_eq!((layout.len(), layout.to_string().as_str()), (len, text));
-            assert_eq!(stated.find(layout.code()), Some(layout));
+            assert_eq!(several_layouts.find(layout.code()), Some(layout));
         }
         for unknown in ["2", "", "NaN"] {
-            assert_eq!(stated.parse(unknown), None);
+            assert_eq!(several_layouts.parse(unknown), None);
         }
         let single = ActionSpace {
             agents_choose_layout: false,

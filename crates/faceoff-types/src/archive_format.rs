@@ -9,7 +9,7 @@ pub enum ArchiveFormat {
     TarZst,
     /// `.zip`
     Zip,
-    /// `.tar`, as `docker save` writes a container image; a bundle of files comes compressed.
+    /// `.tar`, as `docker save` writes a container image. An agent's files are only accepted in the compressed formats.
     Tar,
 }
 

@@ -1,4 +1,5 @@
-//! The clock that is passed in, so that libraries do not read the system's time themselves.
+//! The clock that is passed in, so that libraries do not read the system's time themselves. A *step* is a change of the system
+//! clock that a monotonic clock does not explain: someone, or a time service, has set it. An organiser can accept a step.
 
 mod start;
 mod steady;
@@ -17,14 +18,16 @@ pub struct Clock(Source);
 
 #[derive(Clone)]
 enum Source {
-    Plain(Arc<dyn Fn() -> Timestamp + Send + Sync>),
+    /// Any function that returns the time, such as one of a test.
+    Function(Arc<dyn Fn() -> Timestamp + Send + Sync>),
+    /// The system clock without its steps.
     Steady(Arc<SteadyClock>),
 }
 
 impl Clock {
     /// A clock that calls `now` for each reading.
     pub fn new(now: impl Fn() -> Timestamp + Send + Sync + 'static) -> Self {
-        Self(Source::Plain(Arc::new(now)))
+        Self(Source::Function(Arc::new(now)))
     }
 
     /// A clock that follows the system clock as long as the monotonic clock, which also runs while the machine is suspended,
@@ -42,7 +45,7 @@ impl Clock {
     #[must_use]
     pub fn now(&self) -> Timestamp {
         match &self.0 {
-            Source::Plain(now) => now(),
+            Source::Function(now) => now(),
             Source::Steady(steady) => steady.read().server_at,
         }
     }
@@ -52,7 +55,7 @@ impl Clock {
     #[must_use]
     pub fn earliest(&self) -> Timestamp {
         match &self.0 {
-            Source::Plain(now) => now(),
+            Source::Function(now) => now(),
             Source::Steady(steady) => {
                 let reading = steady.read();
                 reading.server_at.min(reading.system_at)
@@ -64,7 +67,7 @@ impl Clock {
     #[must_use]
     pub fn step(&self) -> Option<ClockStep> {
         match &self.0 {
-            Source::Plain(_) => None,
+            Source::Function(_) => None,
             Source::Steady(steady) => steady.read().step,
         }
     }
@@ -74,7 +77,7 @@ impl Clock {
     #[must_use]
     pub fn accept(&self, step: &ClockStep) -> bool {
         match &self.0 {
-            Source::Plain(_) => false,
+            Source::Function(_) => false,
             Source::Steady(steady) => steady.accept(step),
         }
     }
@@ -86,11 +89,12 @@ impl Clock {
         }
     }
 
-    /// The time at the zero of the monotonic clock; `None` without one.
+    /// The time at the zero of the monotonic clock, which is the boot of the machine; `None` without a monotonic clock. The next
+    /// process of the same boot starts with it ([`ClockStart`]).
     #[must_use]
     pub fn zero_at(&self) -> Option<Timestamp> {
         match &self.0 {
-            Source::Plain(_) => None,
+            Source::Function(_) => None,
             Source::Steady(steady) => Some(steady.zero_at()),
         }
     }

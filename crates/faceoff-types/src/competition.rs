@@ -1,4 +1,5 @@
-//! A competition: what the platform has to know of it in order to run and to show it.
+//! A competition: what the platform has to know of it in order to run and to show it. A stage of the season has *rules*, which may
+//! replace some values of the competition: its *variation*.
 
 use crate::{
     ACTION_LIMIT, ActionSpace, EpisodeEnd, InvalidMagnitude, InvalidStageRules, InvalidTournament,
@@ -12,7 +13,7 @@ use std::collections::HashSet;
 /// their columns, and parsers of answers the layouts of actions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Competition {
-    /// Letters, digits and dashes. It tells competitions apart.
+    /// Letters, digits and dashes: identifies the competition in files and in [`Self::hash`].
     pub id: String,
     /// Its name for people.
     pub title: String,
@@ -139,12 +140,13 @@ impl Competition {
         let mut seen = HashSet::new();
         let is_new = |info: &RulesetInfo| seen.insert(info.ruleset);
         require(self.rulesets.iter().all(is_new), "a ruleset occurs twice")?;
-        // Larger numbers are refused when an agent sends them, infinite ones always.
+        // Numbers of an agent beyond `ACTION_LIMIT` are refused when they arrive. So recordings must allow numbers up to it. Infinite
+        // ones are refused always.
         let has_valid_limit =
             |info: &RulesetInfo| (ACTION_LIMIT..=f64::MAX).contains(&info.action_limit);
         require(
             self.rulesets.iter().all(has_valid_limit),
-            "recorded numbers of a ruleset must be as large as an agent may send",
+            "the action limit of a ruleset must be finite, and at least the largest number that an agent may send",
         )?;
         let mut defaults = Magnitudes::default();
         for info in &self.magnitudes {
@@ -181,7 +183,7 @@ impl Competition {
             all_recorded && limits.len() == self.world_violations().count(),
             "its recordings do not have each limit once",
         )?;
-        // The filter of episodes has these names.
+        // In the filter of lists of episodes these words mean a violation of any kind, and late answers.
         let is_reserved = |name: ViolationName| matches!(name.as_str(), "any" | "late");
         require(
             !self.world_violations().any(is_reserved),
@@ -190,7 +192,8 @@ impl Competition {
     }
 
     /// BLAKE3 of what scores depend on, as 64 hexadecimal digits: id, tasks with weights and lengths, violations with points, bounds of
-    /// tiers, profiles. Texts are not part of it, nor what a ruleset names: its constants and the defaults of magnitudes.
+    /// tiers, profiles. Texts are not part of it. Nor are the constants and the defaults of magnitudes, which the name of a ruleset
+    /// identifies.
     #[must_use]
     pub fn hash(&self) -> String {
         let mut hasher = blake3::Hasher::new();
@@ -248,21 +251,21 @@ impl Competition {
     /// The weights of the tasks under a stage's rules.
     #[must_use]
     pub fn weights(&self, variation: &Variation) -> TaskWeights {
-        let own = || self.tasks.iter().map(|info| (info.task, info.weight));
+        let defaults = || self.tasks.iter().map(|info| (info.task, info.weight));
         match &variation.weights {
-            // The order in JSON has no meaning.
+            // JSON objects have no order, so the order of a stored map is replaced by that of the tasks.
             Some(weights) => weights
                 .in_order(self.task_names())
                 .unwrap_or_else(|_| weights.clone()),
-            None => TaskWeights::unchecked(own().collect()),
+            None => TaskWeights::unchecked(defaults().collect()),
         }
     }
 
     /// The bounds of the tiers under a stage's rules; `None` if the competition has no tiers.
     #[must_use]
     pub fn tier_bounds(&self, variation: &Variation) -> Option<TierBounds> {
-        let own = self.tiers?;
-        Some(variation.tier_bounds.unwrap_or(own))
+        let default = self.tiers?;
+        Some(variation.tier_bounds.unwrap_or(default))
     }
 
     /// These counts, and 0 for all other kinds of violations.
@@ -351,7 +354,7 @@ impl Competition {
         map.sort_by(|a, _, b, _| position(a).cmp(&position(b)));
     }
 
-    /// Checks magnitudes, and completes them in the order of files; none is left if all are those of the competition.
+    /// Checks magnitudes, and completes them in the order of files. If all have the competition's defaults, `magnitudes` becomes empty.
     ///
     /// # Errors
     /// The first magnitude that is unknown or out of range.
@@ -376,12 +379,12 @@ impl Competition {
         rules.tasks.sort_by_key(order);
         if let Some(weights) = &rules.variation.weights {
             let weights = weights.in_order(self.task_names())?;
-            let is_own = weights == self.weights(&Variation::default());
-            rules.variation.weights = (!is_own).then_some(weights);
+            let is_default = weights == self.weights(&Variation::default());
+            rules.variation.weights = (!is_default).then_some(weights);
         }
         if let Some(bounds) = rules.variation.tier_bounds {
-            let own = self.tiers.ok_or(InvalidStageRules::NoTiers(bounds))?;
-            rules.variation.tier_bounds = (bounds != own).then_some(bounds);
+            let default = self.tiers.ok_or(InvalidStageRules::NoTiers(bounds))?;
+            rules.variation.tier_bounds = (bounds != default).then_some(bounds);
         }
         Ok(())
     }
@@ -465,7 +468,7 @@ impl ViolationInfo {
         }
     }
 
-    /// Do its penalty points depend on its size?
+    /// Do its penalty points depend on its size, as those of the computation time do?
     #[must_use]
     pub fn has_range(&self) -> bool {
         self.points[0] != self.points[1]
@@ -484,7 +487,7 @@ impl ViolationInfo {
 mod tests {
     use super::*;
 
-    const PLAIN: Profile = Profile::new("plain");
+    const IDEAL: Profile = Profile::new("ideal");
 
     fn competition(tiers: Option<TierBounds>) -> Competition {
         Competition {
@@ -513,14 +516,14 @@ mod tests {
             violations: Vec::new(),
             tiers,
             profiles: vec![ProfileInfo {
-                profile: PLAIN,
-                title: "plain".to_owned(),
+                profile: IDEAL,
+                title: "ideal".to_owned(),
                 description: "No perturbations.".to_owned(),
-                letter: 'P',
+                letter: 'I',
                 is_in_ablations: true,
             }],
-            ideal_profile: PLAIN,
-            counting_profile: PLAIN,
+            ideal_profile: IDEAL,
+            counting_profile: IDEAL,
             magnitudes: Vec::new(),
             actions: ActionSpace {
                 agents_choose_layout: false,
@@ -530,13 +533,13 @@ mod tests {
         }
     }
 
-    /// The rules with these bounds after the check of a competition.
+    /// Stage rules with the tier bounds `bounds`, after their check by a competition whose own bounds are `tiers`.
     fn checked(tiers: Option<&str>, bounds: Option<&str>) -> Result<StageRules, InvalidStageRules> {
         let parsed = |text: &str| text.parse().unwrap();
         let mut rules = StageRules {
             runtimes: None,
             ruleset: Ruleset::new("points-1"),
-            profile: PLAIN,
+            profile: IDEAL,
             tasks: vec![Task::new("reach")],
             episodes_per_task: 1,
             max_faults: 0,

@@ -7,7 +7,7 @@ use std::{fmt, str::FromStr};
 /// The longest deadline in hours: 31 days.
 pub const MAX_DEADLINE_H: u32 = 744;
 
-/// When an evaluation day ends. Episodes that have not been played by then are never played.
+/// When an evaluation day ends at the latest. Episodes that have not been played by then are never played.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]

@@ -12,8 +12,9 @@ pub trait DeprecatedNames {
 
 /// Implements `Serialize` and `Deserialize` for a type with renamed fields, as `Type { old => new }`.
 ///
-/// The type derives both with `#[serde(remote = "Self")]`, which makes them inherent functions; the implementations add
-/// the old names to them. Fields of an enum's variants are named like those of a struct.
+/// The type derives both traits with `#[serde(remote = "Self")]`, by which serde generates functions of the type instead of the traits.
+/// The macro implements the traits with these functions, and adds the old names. Renamed fields of an enum's variants are listed
+/// without their variant.
 #[macro_export]
 macro_rules! deprecated_names {
     ($type:ident { $($old:ident => $new:ident),+ $(,)? }) => {
@@ -36,7 +37,7 @@ macro_rules! deprecated_names {
     };
 }
 
-/// Serialises a value with the old names beside the new ones; `to_json` writes the new ones.
+/// Serialises a value with the old names beside the new ones; `to_json` serialises it with the new ones only.
 pub fn serialize<T: DeprecatedNames, S: Serializer>(
     to_json: impl FnOnce(value::Serializer) -> Result<Value, Error>,
     serializer: S,
@@ -52,7 +53,8 @@ pub fn serialize<T: DeprecatedNames, S: Serializer>(
     json.serialize(serializer)
 }
 
-/// Deserialises a value with old names, new names or both; if a field has both, the new name wins. `from_json` reads the new ones.
+/// Deserialises a value with old names, new names or both; if a field has both, the new name wins. `from_json` reads a value that
+/// has the new names only.
 pub fn deserialize<'de, T: DeprecatedNames, D: Deserializer<'de>>(
     from_json: impl FnOnce(Value) -> Result<T, Error>,
     deserializer: D,

@@ -4,7 +4,7 @@ use crate::AgentTask;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// What an agent did wrong (PROTOCOL, "Agent faults"). A platform fault has a different type, in the crate
+/// What an agent did wrong (docs/protocol.md, "Faults"). A platform fault has a different type, in the crate
 /// where it arises, and is never converted into one of these.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
@@ -58,7 +58,7 @@ pub enum AgentFaultKind {
     ClosedOutput,
     /// The process ended while an answer was due.
     Exited { code: i32 },
-    /// The process was ended by a signal that the evaluator did not send.
+    /// The process was ended by a signal that the evaluator (the program that plays the episodes) did not send.
     Signalled { signal: i32 },
     /// The process was ended because it exceeded a resource limit.
     LimitExceeded {

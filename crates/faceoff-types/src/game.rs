@@ -20,10 +20,11 @@ pub const FOULS_PER_POINT: u32 = 3;
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum ForfeitScore {
-    /// 10 : 0. The rule of tournaments that earlier versions opened.
+    /// 10 : 0 in any case. The rule of tournaments that earlier versions opened.
     #[default]
     Ten,
-    /// 10 : 0, or as it stood if that side led by more than ten. A side that is far behind gains nothing by a forfeit.
+    /// 10 : 0, or the score at the forfeit if that side led by more than ten. So a side that is far behind cannot reduce its defeat by a
+    /// forfeit.
     TenOrLead,
 }
 
@@ -152,7 +153,7 @@ pub struct SideOutcome {
 pub struct GameWindow {
     /// Control steps of the window.
     pub steps: u32,
-    /// Constraints violated at least once.
+    /// The robot's limits that were violated at least once in the window.
     pub violations: Violations,
     /// Includes answers that came too late to take effect.
     pub computation_time: ComputationTime,

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Limits of each side of a game, in addition to the time limits of single answers (RULES, "Tournament").
+/// Limits of each side of a game, in addition to the time limits of single answers (docs/rules.md, "Tournament").
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(default, deny_unknown_fields)]

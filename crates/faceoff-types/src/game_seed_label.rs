@@ -56,8 +56,8 @@ impl GameSeedLabel {
 }
 
 impl Seed {
-    /// Season secret → the seed for the draw and the games of a tournament. It depends only on the tournament's number
-    /// in the season, so a repeated season has the same seeds.
+    /// The seed for the draw and the games of a tournament, derived from the season secret (`self`). It depends only on the
+    /// tournament's number in the season, so a repeated season has the same seeds.
     #[must_use]
     pub fn tournament(&self, number: u32) -> Self {
         self.derive("tournament", &number.to_le_bytes())

@@ -75,7 +75,7 @@ id!(
     "evaluation"
 );
 id!(
-    /// A submission evaluated under each perturbation of the simulator alone.
+    /// An ablation: a submission evaluated in the ideal simulator and under each perturbation alone, to show what each of them costs.
     AblationId,
     "ablation"
 );

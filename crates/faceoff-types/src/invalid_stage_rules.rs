@@ -5,7 +5,7 @@ use crate::{
     MAX_EPISODES_PER_TASK, TierBounds, UnknownProfile, UnknownRuleset, UnknownTask,
 };
 
-/// The largest number of days in the mean of a board row.
+/// The largest number of evaluation days over which a board may average a team's scores.
 pub const MAX_MEAN_DAYS: u32 = 100;
 
 /// Invalid rules or settings of a stage.
@@ -22,7 +22,7 @@ pub enum InvalidStageRules {
     UnknownProfile(#[from] UnknownProfile),
     #[error("weights: {0}")]
     Weights(#[from] InvalidWeights),
-    /// Bounds of tiers that do not exist.
+    /// Bounds of tiers, but the competition has no tiers.
     #[error("tier_bounds: the competition has no tiers, got the bounds {0}; leave them out")]
     NoTiers(TierBounds),
     #[error("episodes_per_task: expected 1 to {MAX_EPISODES_PER_TASK}, got {0}")]

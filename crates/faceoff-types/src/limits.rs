@@ -16,7 +16,7 @@ pub struct AgentLimits {
     pub time: TimeLimits,
 }
 
-/// Limits of a bundle (PROTOCOL, "Bundle").
+/// Limits of a bundle (docs/protocol.md, "A bundle").
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(default, deny_unknown_fields)]
@@ -58,7 +58,7 @@ pub struct ResourceLimits {
     pub scratch_bytes: u64,
     /// Open file descriptors per process.
     pub open_files: u32,
-    /// Largest single file in bytes.
+    /// Largest single file that the agent writes, in bytes.
     pub file_size_bytes: u64,
     /// CPUs: seconds of CPU time per second, enforced every 10 ms by the cgroup's quota.
     pub cpus: f64,
@@ -82,7 +82,7 @@ impl Default for ResourceLimits {
     }
 }
 
-/// How long an agent may take (PROTOCOL, "Time"), in seconds.
+/// How long an agent may take (docs/protocol.md, "Time"), in seconds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(default, deny_unknown_fields)]
@@ -93,7 +93,7 @@ pub struct TimeLimits {
     pub reset_s: f64,
     /// To answer one `step`.
     pub step_s: f64,
-    /// Largest mean answer time per task in a validation run, which checks an upload.
+    /// Largest mean answer time per task in a validation run, which checks an upload. A slower agent makes the submission invalid.
     pub mean_s: f64,
     /// Budget for the answers of an episode: this factor times the control time of its steps …
     pub episode_control_times: f64,
@@ -105,8 +105,8 @@ pub struct TimeLimits {
     pub resets_extra_s: f64,
     /// Grace period to exit after `bye`, or after closing its output, before it is killed.
     pub bye_s: f64,
-    /// Maximum number of repetitions of an episode because of host interference; then the last try counts.
-    /// 0: never repeated.
+    /// Maximum number of repetitions of an episode because of host interference (other load of the machine delayed the agent's
+    /// answers); then the last try counts. 0: never repeated.
     #[serde(rename = "host_noise_reruns")]
     pub host_interference_reruns: u32,
     /// Maximum number of such repetitions per 100 episodes; for other numbers in proportion, rounded up.
@@ -136,8 +136,9 @@ impl TimeLimits {
     /// Upper bound of every wait for an agent.
     pub const MAX_WAIT: Duration = Duration::from_secs(3600);
 
-    /// The longest time for which an agent can occupy a slot, in seconds: the sum of its budgets for `episodes`
-    /// episodes of at most `longest_episode_s` (simulated time) in `shards` shards, with a restart after each of `max_faults` faults. Host interference comes on top.
+    /// The longest time for which an agent can occupy a slot, in seconds: the sum of its budgets for `episodes` episodes of at most
+    /// `longest_episode_s` (simulated time) in `shards` shards, with a restart after each of `max_faults` faults. Host interference
+    /// comes on top.
     #[must_use]
     pub fn max_slot_time_s(
         &self,

@@ -58,7 +58,7 @@ pub enum GameEvent {
     LeftTable,
     /// A side's commands drove the simulated world beyond what can be simulated: the rally ended.
     Diverged,
-    /// A side violated the protocol or a limit. Its arm held still until the end of the rally, which is now over.
+    /// A side violated the protocol or a limit. Its arm held still until the end of the rally. The event is sent when the rally is over.
     Fault {
         /// 1 or 2.
         #[cfg_attr(feature = "openapi", schema(value_type = u32, minimum = 1, maximum = 2))]

@@ -2,11 +2,11 @@
 
 use unicode_normalization::UnicodeNormalization;
 
-// `CHARACTERS` in ascending order; the prototype of each, what it looks like, is the part of `PROTOTYPES` that ends at the number in `ENDS`.
-// Written by build.rs.
+// Written by build.rs: `CHARACTERS` in ascending order. The *prototype* of a character is the text that it looks like. It is the part of
+// `PROTOTYPES` that ends at the character's number in `ENDS`, in bytes.
 include!(concat!(env!("OUT_DIR"), "/look_alikes.rs"));
 
-/// What a character looks like; `None` if only like itself.
+/// The text that a character looks like; `None` if it looks only like itself.
 fn prototype(c: char) -> Option<&'static str> {
     let index = CHARACTERS.binary_search(&c).ok()?;
     let start = match index {
@@ -38,7 +38,7 @@ mod tests {
         let standard = |text: &str| confusable_detection::skeleton(text).collect::<String>();
         let mut last = 'x';
         for c in '\u{1}'..=char::MAX {
-            // With a neighbour, since marks are sorted.
+            // Alone, and between a neighbour and a mark: decomposition sorts adjacent marks, which may change their order.
             for text in [c.to_string(), format!("{last}{c}\u{323}")] {
                 assert_eq!(skeleton(&text), standard(&text), "{text:?}");
             }

@@ -14,7 +14,7 @@ use std::{fmt, marker::PhantomData};
 #[serde(transparent)]
 pub struct Magnitudes(Fields<Fields<Magnitude>>);
 
-/// Values by name, each name once.
+/// A map of values by name. Its JSON is refused if a name occurs twice, where serde's maps would take the last value.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(transparent)]
 struct Fields<T>(IndexMap<String, T>);
@@ -53,7 +53,7 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Fields<T> {
     }
 }
 
-/// A magnitude: a number, or two.
+/// The value of a magnitude: a number, or two (a range from which the simulator draws).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(untagged, expecting = "expected a number or two numbers")]
 pub enum Magnitude {
@@ -113,7 +113,7 @@ fn known_text(known: &[String]) -> String {
 }
 
 impl Magnitudes {
-    /// Are all magnitudes the competition's? A checked value without magnitudes says so.
+    /// Do all magnitudes have the competition's defaults? [`Competition::check_rules`](crate::Competition::check_rules) leaves none then.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.0.0.is_empty()
@@ -139,7 +139,7 @@ impl Magnitudes {
         serde_json::from_value(serde_json::to_value(self)?)
     }
 
-    /// Checks the magnitudes, and completes them in the order of their descriptions. If all are the defaults, none is left.
+    /// Checks the magnitudes, and completes them in the order of their descriptions. If all have the defaults, the map becomes empty.
     pub(crate) fn complete(&mut self, known: &[MagnitudeInfo]) -> Result<(), InvalidMagnitude> {
         for (group, values) in &self.0.0 {
             let of_group = || known.iter().filter(|info| info.group == *group);
@@ -181,7 +181,7 @@ impl InvalidMagnitude {
 }
 
 impl MagnitudeInfo {
-    /// The value in the kind of the default, if it is valid.
+    /// The value, if it is valid: of the default's kind (whole numbers are accepted where any numbers are) and within the bounds.
     fn checked(&self, given: Magnitude) -> Result<Magnitude, InvalidMagnitude> {
         use Magnitude::{Count, Counts, Number, Range};
         let value = match (self.default, given) {
@@ -197,7 +197,7 @@ impl MagnitudeInfo {
             Range(range) => range,
         };
         let [least, most] = self.bounds;
-        // Numbers that are not comparable fail, too.
+        // NaN compares as false, so it is refused, too.
         if is_same_kind && least <= low && low <= high && high <= most {
             return Ok(value);
         }
@@ -228,7 +228,7 @@ mod schema {
         openapi::{ObjectBuilder, RefOr, Schema, Type},
     };
 
-    /// The document of the API has the groups and names of the competition in its place.
+    /// A placeholder: the server puts the groups and names of its competition in its place in the API's document.
     impl PartialSchema for Magnitudes {
         fn schema() -> RefOr<Schema> {
             ObjectBuilder::new().schema_type(Type::Object).into()

@@ -8,7 +8,7 @@ use unicode_normalization::{UnicodeNormalization, char::is_combining_mark};
 /// Longest name, in characters without accents and other marks.
 const MAX_CHARS: usize = 40;
 
-/// More marks on one character cover the lines above and below it. No language writes so many.
+/// Most marks on one character. More of them would cover the lines above and below it, and no language writes so many.
 const MAX_MARKS: usize = 4;
 
 /// Signs that are part of names, beside letters and digits.
@@ -51,7 +51,7 @@ fn check(text: &str) -> Result<(), NameProblem> {
             marks += 1;
             previous != ' ' && is_printable(c)
         } else if is_joiner(c) {
-            joins(previous) && rest.peek().is_some_and(|next| joins(*next))
+            can_join(previous) && rest.peek().is_some_and(|next| can_join(*next))
         } else {
             marks = 0;
             SIGNS.contains(c) || (c.is_alphanumeric() && is_printable(c))
@@ -75,13 +75,14 @@ const fn is_joiner(c: char) -> bool {
     matches!(c, '\u{200c}' | '\u{200d}')
 }
 
-/// Whether letters of this character's script can be joined.
-fn joins(c: char) -> bool {
+/// Whether letters of this character's script can be joined. Only between two such letters may a name contain a joiner.
+fn can_join(c: char) -> bool {
     // Arabic and Syriac; the scripts of India and its neighbours.
     matches!(c, '\u{600}'..='\u{7ff}' | '\u{8a0}'..='\u{dff}') && is_printable(c)
 }
 
-/// The text as all systems write it: macOS, for example, splits “é” into a letter and an accent, and keyboards have other spaces.
+/// One form for texts that look the same: macOS, for example, splits “é” into a letter and an accent, and some keyboards type unusual
+/// spaces. The result has “é” as one character, and ordinary spaces.
 fn normalised(text: &str) -> String {
     let is_space = |c| {
         matches!(
@@ -97,9 +98,9 @@ fn normalised(text: &str) -> String {
 /// scripts, upper case, 0 and O. It is not for display.
 #[must_use]
 pub fn name_skeleton(name: &str) -> String {
-    let plain: String = name.trim().nfkc().filter(|c| !is_joiner(*c)).collect();
+    let without_joiners: String = name.trim().nfkc().filter(|c| !is_joiner(*c)).collect();
     // Upper and lower case of a letter may resemble different letters.
-    let lower = plain.to_lowercase();
+    let lower = without_joiners.to_lowercase();
     skeleton(&lower).to_lowercase()
 }
 

@@ -19,14 +19,14 @@ impl EpisodeEnd {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EpisodeOutcome {
     pub task: Task,
-    /// Index of the episode within the evaluation, from 0.
+    /// Number of the episode among those of its task in the run, from 0.
     pub episode: u32,
     /// Control steps played.
     pub steps: u32,
     pub end: EpisodeEnd,
     /// Success, tested on the last true state of the simulator; always false after an agent fault.
     pub success: bool,
-    /// Constraints violated at least once.
+    /// The agent's limits that were violated at least once.
     pub violations: Violations,
     pub computation_time: ComputationTime,
     /// The fault that ended the episode, if any.

@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn excerpt_has_at_most_so_many_characters() {
+    fn excerpt_has_at_most_the_given_number_of_characters() {
         for (text, excerpt) in [
             ("", ""),
             ("größer", "größ"),

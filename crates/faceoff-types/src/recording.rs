@@ -18,7 +18,7 @@ pub struct RecordingColumns {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RecordingColumn {
     pub name: String,
-    /// Is it absent in some tasks? An observation without it is shorter, so of observations only the last columns can be.
+    /// Is it absent in some tasks? An observation without it is shorter, so only the last columns of an observation can be optional.
     pub optional: bool,
 }
 

@@ -28,11 +28,11 @@ pub struct TaskResult {
     /// 95 % Wilson interval of the success rate, as fractions.
     #[cfg_attr(feature = "openapi", schema(min_items = 2, max_items = 2))]
     pub success_ci95: [f64; 2],
-    /// Penalty points over all episodes: the task's deployability score (DS).
+    /// Penalty points over all episodes: the task's deployability score (DS), where fewer are better.
     pub penalty_points: f64,
     /// Episodes with each violation.
     pub violations: ViolationCounts,
-    /// Tier according to the penalty points; absent in a competition without tiers.
+    /// Tier according to the penalty points per episode; absent in a competition without tiers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "openapi", schema(nullable = false))]
     pub tier: Option<Tier>,
@@ -53,7 +53,7 @@ pub struct EvaluationResult {
     /// The evaluation's seed, 64 hexadecimal digits.
     pub seed: Seed,
     pub tasks: TaskMap<TaskResult>,
-    /// Overall score in percent; tasks that were not played count as 0.
+    /// Overall score: the weighted mean of the tasks' success rates, in percent; tasks that were not played count as 0.
     pub score: f64,
     /// Overall DS: the maximum over the tasks.
     pub penalty_points: f64,

@@ -12,7 +12,7 @@ pub const MAX_KEPT_EVALUATIONS: u32 = 1000;
 pub const MAX_DAYS_AFTER_SIGN_OFF: u32 = 3650;
 
 /// How long a stage's large files are kept: the datasets of its evaluations, and the archives of submissions that
-/// are no longer used. Results, boards and the log are always kept. Without any field everything is kept.
+/// are no longer used. Results, boards and the log of events are always kept. Without any field everything is kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(default, deny_unknown_fields)]

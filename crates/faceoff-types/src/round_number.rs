@@ -14,7 +14,7 @@ pub struct RoundNumber(NonZeroU32);
 pub struct InvalidRoundNumber(u32);
 
 impl RoundNumber {
-    /// The highest number. Tournaments have few rounds, and standings list them all.
+    /// The highest number. It is bounded because standings list all rounds.
     pub const MAX: u32 = 100;
     pub const FIRST: Self = Self(NonZeroU32::MIN);
     pub const SECOND: Self = Self(NonZeroU32::MIN.saturating_add(1));

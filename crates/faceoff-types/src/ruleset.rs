@@ -8,8 +8,8 @@ short_name! {
     Ruleset, "a ruleset", with_dots
 }
 
-/// The largest magnitude of a number in an action, in the units of the action.
-/// It is far beyond what a robot can follow, and small enough that no computation overflows.
+/// The largest magnitude of a number in an action that an agent may send, in the units of the action.
+/// It is far beyond what a robot can follow, and small enough that no computation overflows. Larger numbers are agent faults.
 pub const ACTION_LIMIT: f64 = 1e4;
 
 /// A ruleset that the competition does not have.

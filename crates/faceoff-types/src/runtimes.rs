@@ -83,7 +83,9 @@ pub struct StageRuntimes {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("the stage “{}” takes agents of the runtime {} only, and {}", .refuser.stage, .refuser.runtimes, describe_runtime(.runtime.as_deref()))]
 pub struct RuntimeRefused {
+    /// The stage that refuses the agent.
     refuser: StageRuntimes,
+    /// The agent's runtime; `None` if it is not known.
     runtime: Option<String>,
 }
 

@@ -137,8 +137,8 @@ impl Schedule {
         None
     }
 
-    /// As [`Self::next`], but including days off and perhaps before `earliest`. A time that the change to summer time
-    /// skips is moved to after the change.
+    /// The first start on or after the date `from`, which may be on a day off, and for daily schedules before `earliest`.
+    /// A time that the change to summer time skips is moved to after the change.
     fn first_from(
         &self,
         from: Date,
@@ -247,7 +247,7 @@ mod tests {
                 "2026-11-24 2026-11-24T11:00:00Z",
             ]
         );
-        // On the first date, the first remaining time.
+        // If 06:00 of the first date has passed, the start is at 18:00 of the same date.
         let earliest = "2026-11-20T12:00:00Z".parse().unwrap();
         let next = weekdays.next(date(2026, 11, 20), earliest, &IanaTimeZone::UTC);
         assert_eq!(next.unwrap().1.to_string(), "2026-11-20T18:00:00Z");

@@ -42,6 +42,8 @@ impl Seed {
         Self(*hasher.finalize().as_bytes())
     }
 
+    // The functions below derive a child from `self`, which must be the seed that their comment names before the arrow.
+
     /// Season secret → the seed from which all days of a stage are derived.
     #[must_use]
     pub fn stage(&self, stage: StageId) -> Self {
@@ -65,7 +67,7 @@ impl Seed {
     /// Season secret → the seed of a submission's validation run.
     #[must_use]
     pub fn validation(&self, submission: SubmissionId) -> Self {
-        // The label is older than the term "validation run".
+        // "smoke" was the name of validation runs. Another label would change all seeds.
         self.derive("smoke", submission.as_uuid().as_bytes())
     }
 
@@ -81,7 +83,8 @@ impl Seed {
         self.derive("trial", proposal.as_uuid().as_bytes())
     }
 
-    /// Season secret (or a local seed) → the seed of the season's model mismatch.
+    /// Season secret (or a local seed) → the seed of the season's model mismatch: the differences between the robot's model that
+    /// teams have and the evaluator's, which are the same in all episodes of a season.
     #[must_use]
     pub fn model_mismatch(&self) -> Self {
         self.derive("model_mismatch", &[])

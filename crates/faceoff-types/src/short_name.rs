@@ -13,7 +13,7 @@ pub(crate) struct ShortName {
 }
 
 impl ShortName {
-    /// `None` if the text is no short name.
+    /// `None` if the text is no short name. `with_dots`: dots are allowed, too.
     pub(crate) const fn from_text(text: &str, with_dots: bool) -> Option<Self> {
         let text = text.as_bytes();
         if text.is_empty() || text.len() > MAX_LEN || !text[0].is_ascii_lowercase() {
@@ -23,8 +23,8 @@ impl ShortName {
         let mut index = 0;
         while index < text.len() {
             let byte = text[index];
-            let is_plain = matches!(byte, b'a'..=b'z' | b'0'..=b'9' | b'_' | b'-');
-            let is_allowed = is_plain || with_dots && byte == b'.';
+            let is_always_allowed = matches!(byte, b'a'..=b'z' | b'0'..=b'9' | b'_' | b'-');
+            let is_allowed = is_always_allowed || with_dots && byte == b'.';
             if !is_allowed {
                 return None;
             }
@@ -161,7 +161,7 @@ mod tests {
     use crate::{Ruleset, Task};
 
     #[test]
-    fn names_are_short_and_plain() {
+    fn names_are_short_and_without_capitals() {
         let longest = "a".repeat(MAX_LEN);
         for name in ["hit", "reach-2_b", &longest] {
             let task: Task = name.parse().unwrap();

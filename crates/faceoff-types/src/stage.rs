@@ -1,5 +1,5 @@
 //! A stage is a part of a season with its own rules, evaluation days and board (table of results). This module has its
-//! rules and the id of one of its days.
+//! rules, and [`StageDay`], which identifies one of its days.
 
 use crate::{
     MAX_EPISODES_PER_TASK, Profile, Ruleset, Runtimes, StageId, StageLimits, Task, Variation,
@@ -54,7 +54,7 @@ pub struct StageRules {
     pub episodes_per_task: u32,
     /// Agent faults allowed; one more ends an evaluation without a score.
     pub max_faults: u32,
-    /// Task weights, tier bounds and perturbation magnitudes that differ from the ruleset.
+    /// Task weights, tier bounds and perturbation magnitudes that differ from the competition's.
     #[serde(flatten)]
     pub variation: Variation,
     /// Limits of agents that differ from the server's configuration; absent if none do.

@@ -3,14 +3,14 @@
 use crate::short_name::short_name;
 use indexmap::IndexMap;
 
-/// The length of a control step, s (RULES, "Stages").
+/// The length of a control step of air hockey, in seconds (docs/rules.md, "What is played"). Other competitions have their own.
 pub const CONTROL_STEP_S: f64 = 0.02;
 
-/// Maximum number of control steps of a qualifying episode.
+/// Control steps of the longest episode of air hockey.
 pub const EPISODE_STEPS: u32 = 500;
 
-/// Maximum number of episodes per task in a run: a hundred times the qualifying stage, where the success
-/// rate is known to ±0.3 %. Scoring holds all outcomes of a run in memory, some 300 bytes each.
+/// Maximum number of episodes per task in a run: a hundred times those of the original challenge's qualifying stage. With so many, a
+/// success rate is known to ±0.3 %. Scoring holds all outcomes of a run in memory, some 300 bytes each.
 pub const MAX_EPISODES_PER_TASK: u32 = 100_000;
 
 /// Values by task, in the order of the competition's tasks.

@@ -62,7 +62,7 @@ impl TaskWeights {
         Err(InvalidWeights::Sum(listed(got, "and")))
     }
 
-    /// Weights whose sum is known to be 1.
+    /// Weights whose sum the caller knows to be 1, so that it is not checked.
     pub(crate) const fn unchecked(weights: TaskMap<Millionths>) -> Self {
         Self(weights)
     }

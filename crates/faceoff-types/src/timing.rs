@@ -29,7 +29,7 @@ impl RoundTrips {
     }
 }
 
-/// Timing quality of a slot, measured by the platform's calibration agent on the agent's CPUs.
+/// Timing quality of a slot. It is measured on the agent's CPUs with the platform's calibration agent, which answers at once.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct SlotTiming {

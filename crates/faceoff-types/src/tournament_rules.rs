@@ -126,7 +126,8 @@ const fn default_steps() -> u32 {
 }
 
 impl TournamentRules {
-    /// The rules of the original challenge, with a ruleset and a profile of the competition.
+    /// The rules of the original challenge, with a ruleset and a profile of the competition. Forfeits and withdrawals have the newer
+    /// rules of this platform.
     #[must_use]
     pub fn new(ruleset: Ruleset, profile: Profile) -> Self {
         Self {
@@ -221,7 +222,7 @@ impl TournamentSettings {
 mod tests {
     use super::*;
 
-    /// The rules of the 2023 Robot Air Hockey Challenge with these changes.
+    /// Rules as stored in JSON: these fields, ruleset and profile; all others are absent.
     fn rules(json: &str) -> Result<TournamentRules, serde_json::Error> {
         let mut fields: serde_json::Map<String, serde_json::Value> = serde_json::from_str(json)?;
         fields.insert("ruleset".to_owned(), "airhockey-2023.3".into());
@@ -230,10 +231,10 @@ mod tests {
     }
 
     #[test]
-    fn rules_default_to_the_challenge() {
+    fn absent_rules_are_those_of_the_challenge() {
         let rules = rules("{}").unwrap();
         let new = TournamentRules::new(rules.ruleset, rules.profile);
-        // Stored rules of earlier versions do not state these.
+        // Rules stored by earlier versions do not have these two fields. So without them, the rules of those versions hold.
         let earlier = TournamentRules {
             forfeit_score: ForfeitScore::Ten,
             withdrawals: Withdrawals::AtOnce,

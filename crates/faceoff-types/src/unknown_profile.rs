@@ -12,7 +12,7 @@ pub struct UnknownProfile {
 }
 
 impl UnknownProfile {
-    /// `expected` are the profiles that there are.
+    /// `expected` are the profiles of the competition.
     #[must_use]
     pub fn new(name: &str, expected: impl IntoIterator<Item = Profile>) -> Self {
         Self {

@@ -12,7 +12,7 @@ pub struct UnknownTask {
 }
 
 impl UnknownTask {
-    /// `expected` are the tasks that there are.
+    /// `expected` are the tasks of the competition.
     #[must_use]
     pub fn new(name: &str, expected: impl IntoIterator<Item = Task>) -> Self {
         Self {

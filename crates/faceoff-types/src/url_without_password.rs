@@ -2,7 +2,8 @@
 
 use std::borrow::Cow;
 
-/// The URL without what may be a user and a password. The text may be malformed, as in the message of an error.
+/// The URL without user and password: all that is between the scheme and the last `@`. The text need not be a valid URL, since URLs in
+/// error messages may not be one.
 #[must_use]
 pub fn url_without_password(url: &str) -> Cow<'_, str> {
     let Some(at) = url.rfind('@') else {

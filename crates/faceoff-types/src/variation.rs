@@ -1,10 +1,10 @@
-//! Variations: a stage's deviations from the ruleset that affect scores.
+//! Variations: a stage's deviations from the defaults of the competition and of its ruleset that affect scores.
 
 use crate::{Magnitudes, Millionths, TaskWeights, millionths::NotMillionths};
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
 
-/// Deviations from the ruleset that affect scores. Absent values are the ruleset's.
+/// Deviations from the defaults of the competition and of the ruleset that affect scores. Absent values are the defaults.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Variation {
@@ -22,7 +22,7 @@ pub struct Variation {
 }
 
 impl Variation {
-    /// Is everything as in the ruleset?
+    /// Does the stage have all defaults?
     #[must_use]
     pub fn is_empty(&self) -> bool {
         is_default(self)

@@ -14,7 +14,8 @@ impl ViolationName {
     pub const COMPUTATION_TIME: Self = Self::new("computation_time");
 }
 
-/// Which limits an episode violated at least once, in the order of the competition. Two are equal if the same limits are violated.
+/// All limits of the competition's robot in the competition's order, each with whether an episode violated it at least once. Two
+/// values are equal if the same limits are violated.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Violations(IndexMap<ViolationName, bool>);
@@ -31,7 +32,7 @@ impl Violations {
             .filter_map(|(name, violated)| violated.then_some(name))
     }
 
-    /// Is each of these limits listed, and no other? Their order decides nothing: JSON of other programs may have another.
+    /// Is each of these limits listed, and no other? The order is not compared: JSON of other programs may have another.
     #[must_use]
     pub fn has_kinds(&self, kinds: impl Iterator<Item = ViolationName> + Clone) -> bool {
         kinds.clone().count() == self.0.len()

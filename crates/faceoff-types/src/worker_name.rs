@@ -15,7 +15,8 @@ pub struct WorkerName(String);
 pub struct ParseWorkerNameError;
 
 impl WorkerName {
-    /// Prefix of the lease holders of all remote workers.
+    /// Prefix of the lease holders of all remote workers: leases name a slot as its holder, such as `remote/rack-1/slot-0`. The
+    /// holders of the server's own slots are `slot-0` and so on.
     pub const REMOTE: &str = "remote";
 
     #[must_use]
@@ -33,13 +34,13 @@ impl WorkerName {
         worker.parse().ok()
     }
 
-    /// The name of the worker as a lease holder.
+    /// The worker's part of its lease holders: `remote/rack-1`.
     #[must_use]
     pub fn holder(&self) -> String {
         format!("{}/{}", Self::REMOTE, self.0)
     }
 
-    /// Name of a slot of the worker as a lease holder; with an empty `slot`, the prefix of all its slots.
+    /// A slot of the worker as a lease holder: `remote/rack-1/slot-0`. With an empty `slot`, the prefix of all its slots.
     #[must_use]
     pub fn slot_holder(&self, slot: &str) -> String {
         format!("{}/{slot}", self.holder())

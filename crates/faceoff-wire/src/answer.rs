@@ -1,4 +1,5 @@
-//! Strict parsers for the two answers of an agent: `ready` (to `hello` and `reset`) and `act` (to `step`).
+//! Strict parsers for the two answers of an agent: `ready` (to `hello` and `reset`) and `act` (to `step`). If agents choose the layout of
+//! their actions (how many numbers, in which nested arrays), `ready` names it by a code, in the field `interpolation`.
 //!
 //! A line is parsed in one pass without an intermediate tree; the numbers of an action go straight into the
 //! caller's buffer. A second pass is made in two cases only: over a refused line, to explain what is wrong with it,

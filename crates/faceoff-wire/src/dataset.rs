@@ -71,7 +71,7 @@ pub struct ViolationsFile {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct TaskViolations {
-    /// For each constraint of the world, the episodes in which it was violated.
+    /// For each constraint (limit of the robot that the simulator checks), the episodes in which it was violated.
     #[serde(flatten)]
     pub constraints: IndexMap<ViolationName, Vec<ConstraintViolation>>,
     /// Computation time: the episodes with penalty points for it.
@@ -82,7 +82,7 @@ pub struct TaskViolations {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ConstraintViolation {
-    /// Index of the episode within the evaluation, from 0.
+    /// Number of the episode among those of its task in the evaluation, from 0.
     pub episode: u32,
     /// The first control step with a violation.
     pub first_step: u32,
@@ -96,7 +96,7 @@ pub struct ConstraintViolation {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct SlowEpisode {
-    /// Index of the episode within the evaluation, from 0.
+    /// Number of the episode among those of its task in the evaluation, from 0.
     pub episode: u32,
     /// Mean computation time over the answered steps, in seconds.
     pub mean_s: f64,
@@ -147,9 +147,9 @@ impl CalibrationFile {
 pub struct ShardCalibration {
     /// The task.
     pub task: Task,
-    /// Index of the episode within the evaluation, from 0.
+    /// Number of the shard's first episode among those of its task, from 0.
     pub first_episode: u32,
-    /// One past the index of the last episode.
+    /// One more than the number of the shard's last episode.
     pub end_episode: u32,
     /// The measurements.
     #[serde(flatten)]

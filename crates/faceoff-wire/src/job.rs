@@ -166,7 +166,7 @@ pub struct ShardSpec {
     pub ruleset: Ruleset,
     /// The task.
     pub task: Task,
-    /// The episodes, by their index within the evaluation.
+    /// The episodes, by their numbers among those of the task in the run, from 0.
     pub episodes: Range<u32>,
     /// The perturbation profile: a named set of disturbances of the simulation.
     pub profile: Profile,

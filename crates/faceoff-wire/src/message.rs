@@ -23,7 +23,7 @@ pub enum Message<'a> {
     },
     /// Sent before each episode, and before each rally of a game; answered by `ready`.
     Reset {
-        /// Index of the episode within the evaluation; in a game, number of the rally.
+        /// Number of the episode among those of the task in the evaluation, from 0; in a game, number of the rally.
         episode: u32,
     },
     /// Sent for each control step (20 ms); answered by `act`.
@@ -35,7 +35,7 @@ pub enum Message<'a> {
     },
     /// Sent after each episode or rally; not answered.
     End {
-        /// Index of the episode, or number of the rally.
+        /// Number of the episode or rally, as in `reset`.
         episode: u32,
         /// Number of control steps played.
         steps: u32,

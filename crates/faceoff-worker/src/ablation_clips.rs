@@ -28,7 +28,7 @@ pub(crate) async fn join_parts(store: &Store, ideal: Profile) {
 async fn join_ablation(store: &Store, id: AblationId, ideal: Profile) -> anyhow::Result<()> {
     let ablation = match store.ablation(id).await {
         Ok(ablation) => Some(ablation),
-        // The files are newer than the database if it was restored to an earlier state.
+        // The database may have been restored to a state before this ablation. Then the parts are only removed.
         Err(StoreError::NotFound(_)) => None,
         Err(error) => return Err(error.into()),
     };
@@ -38,7 +38,7 @@ async fn join_ablation(store: &Store, id: AblationId, ideal: Profile) -> anyhow:
             state: AblationState::Unfinished { .. },
             ..
         }) => return Ok(()),
-        // A worker that had lost its lease may add a late part: joined clips are not changed.
+        // If the clips are joined already, a worker that had lost its lease may have stored a part late. Then the parts are only removed.
         Some(Ablation {
             state: AblationState::Finished { .. },
             runs,

@@ -55,6 +55,7 @@ impl BundleCache {
         files: &dyn FileStore,
         progress: &Progress,
     ) -> anyhow::Result<UnpackResult> {
+        // An entry is free if it holds the bundle of neither agent.
         let mut found = None;
         let mut free = None;
         for entry in &mut self.entries {

@@ -41,7 +41,7 @@ pub async fn clean_up(store: &Store, competition: &Arc<Competition>, clock: &Clo
     if let Err(error) = store.checkpoint().await {
         tracing::warn!(%error, "the database's write-ahead log could not be copied into the database");
     }
-    // Files have the time of the system clock, which may have been set.
+    // Files have the time of the system clock, which may have been set. So they are old only if both clocks say so.
     let written_before = clock.earliest() - LONGEST_WRITE;
     let abandoned = store.artifacts().remove_abandoned(written_before);
     if let Err(error) = abandoned.await {
@@ -81,7 +81,7 @@ pub(crate) async fn remove_invalid_bundles(store: &Store, now: Timestamp) {
     }
 }
 
-/// Clears finished runs: removes their shards from the database. Each is cleared in its own transaction, so that a failure
+/// Clears finished runs: removes their shards from the database. Each run is cleared in its own transaction, so that a failure
 /// does not affect the others. A *run* is the episodes of a submission under one plan, divided into shards.
 async fn clear_runs(store: &Store, now: Timestamp) -> Result<(), StoreError> {
     for run in store.clearable_runs(EpisodeSummary::VERSION, now).await? {

@@ -31,11 +31,11 @@ impl SlotCpus {
                 [first.to_vec(), second[..first.len()].to_vec()]
             }
             _ => {
-                let mut shared: Vec<usize> = self.simulator.clone();
-                shared.extend(self.agents.iter().flatten());
-                shared.sort_unstable();
-                shared.dedup();
-                [shared.clone(), shared]
+                let mut all_of_slot: Vec<usize> = self.simulator.clone();
+                all_of_slot.extend(self.agents.iter().flatten());
+                all_of_slot.sort_unstable();
+                all_of_slot.dedup();
+                [all_of_slot.clone(), all_of_slot]
             }
         }
     }
@@ -47,8 +47,8 @@ impl SlotCpus {
 pub struct CpuLayout {
     /// One entry per slot.
     pub slots: Vec<SlotCpus>,
-    /// Do agents share CPUs because there are too few?
-    pub shared: bool,
+    /// Do agents share CPUs with each other or with the simulators because there are too few?
+    pub agents_share_cpus: bool,
     /// CPUs for the rest of the server: requests, database, schedule. Empty: any CPU.
     pub server: Vec<usize>,
 }
@@ -68,7 +68,7 @@ impl CpuLayout {
             };
             return Self {
                 slots: vec![unpinned; slots],
-                shared: true,
+                agents_share_cpus: true,
                 server: Vec::new(),
             };
         }
@@ -86,7 +86,7 @@ impl CpuLayout {
             .collect();
         Self {
             slots,
-            shared: false,
+            agents_share_cpus: false,
             server: Vec::new(),
         }
     }
@@ -99,9 +99,9 @@ impl CpuLayout {
         let left_over = cpus.len().saturating_sub(slots * (1 + agents));
         let (server_cpus, rest) = cpus.split_at(left_over.min((cpus.len() / 4).max(1)));
         let mut layout = Self::divide(rest, slots, agents);
-        if !layout.shared {
+        if !layout.agents_share_cpus {
             layout.server = match server_cpus {
-                [] => layout.simulators(),
+                [] => layout.simulator_cpus(),
                 reserved => reserved.to_vec(),
             };
         }
@@ -109,22 +109,22 @@ impl CpuLayout {
     }
 
     /// All agents on the CPUs `agents`, as configured by the organiser. Each simulator has one of the other CPUs and
-    /// the server the rest; if they are too few, simulators and server share them.
+    /// the server the rest. If they are too few, no simulator is pinned, and the server has all of them.
     #[must_use]
     pub fn with_agents_on(agents: &[usize], cpus: &[usize], slots: usize) -> Self {
-        let others: Vec<usize> = cpus
+        let not_for_agents: Vec<usize> = cpus
             .iter()
             .copied()
             .filter(|cpu| !agents.contains(cpu))
             .collect();
-        let (simulators, server_cpus) = if others.len() > slots {
-            let (server_cpus, simulators) = others.split_at(others.len() - slots);
+        let (simulators, server_cpus) = if not_for_agents.len() > slots {
+            let (server_cpus, simulators) = not_for_agents.split_at(not_for_agents.len() - slots);
             (
                 simulators.iter().map(|cpu| vec![*cpu]).collect(),
                 server_cpus,
             )
         } else {
-            (vec![Vec::new(); slots], &others[..])
+            (vec![Vec::new(); slots], &not_for_agents[..])
         };
         let slot = |simulator| SlotCpus {
             simulator,
@@ -132,7 +132,7 @@ impl CpuLayout {
         };
         Self {
             slots: simulators.into_iter().map(slot).collect(),
-            shared: slots > 1,
+            agents_share_cpus: slots > 1,
             server: server_cpus.to_vec(),
         }
     }
@@ -149,7 +149,7 @@ impl CpuLayout {
             return Self::with_agents_on(agent_cpus, &cpus, slots);
         }
         let layout = Self::with_server(&cpus, slots, 1);
-        if layout.shared {
+        if layout.agents_share_cpus {
             tracing::warn!(
                 slots,
                 "fewer than two CPUs per slot: agents share CPUs, and computation times are uneven"
@@ -158,7 +158,7 @@ impl CpuLayout {
         layout
     }
 
-    fn simulators(&self) -> Vec<usize> {
+    fn simulator_cpus(&self) -> Vec<usize> {
         let cpus = self.slots.iter().flat_map(|slot| &slot.simulator);
         cpus.copied().collect()
     }
@@ -195,7 +195,7 @@ mod tests {
             layout,
             CpuLayout {
                 slots,
-                shared: false,
+                agents_share_cpus: false,
                 server: Vec::new(),
             }
         );
@@ -246,7 +246,7 @@ mod tests {
                 layout,
                 CpuLayout {
                     slots,
-                    shared: true,
+                    agents_share_cpus: true,
                     server: Vec::new(),
                 }
             );

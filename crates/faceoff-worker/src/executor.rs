@@ -24,9 +24,9 @@ use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
 /// Runs the jobs of a slot. All errors are platform faults, with one exception: a job also ends with an error soon after
 /// [`Progress::must_stop`] becomes true.
 pub(crate) struct Executor {
-    /// Timing quality of the slot in the last shard.
+    /// Timing quality of the slot in the last shard; `None` before the first.
     pub(crate) timing: Option<SlotTiming>,
-    /// Receives the live updates of games.
+    /// Only receives the live updates of games; claims and commits are made by the slot.
     pub(crate) server: Arc<dyn JobServer>,
     pub(crate) files: Arc<dyn FileStore>,
     /// Only slots of the server's own process have one: the server sends no scoring to a remote worker.
@@ -112,7 +112,7 @@ impl Executor {
                 let scorer = self.scorer.as_ref().with_context(|| {
                     format!("expected a job that runs agents, got the {}", job.payload)
                 })?;
-                let folder = self.folder("dataset")?;
+                let folder = self.temporary_folder("dataset")?;
                 scorer.score(&*self.evaluator, folder.path(), meta, recordings, dataset)
             }
         }
@@ -141,8 +141,8 @@ impl Executor {
         }
     }
 
-    /// An empty folder that is removed when the returned guard is dropped.
-    fn folder(&self, purpose: &str) -> anyhow::Result<tempfile::TempDir> {
+    /// A new empty folder in [`Self::folder`], which is removed when the returned guard is dropped. Its name begins with `purpose`.
+    fn temporary_folder(&self, purpose: &str) -> anyhow::Result<tempfile::TempDir> {
         tempfile::Builder::new()
             .prefix(purpose)
             .tempdir_in(&self.folder)
@@ -211,7 +211,7 @@ impl Executor {
     ) -> anyhow::Result<JobReport> {
         let bundle = self.valid_bundle(agent, None, &progress)?;
         let environment = self.host.environment(&agent.limits, &progress);
-        let out = self.folder("recording")?;
+        let out = self.temporary_folder("recording")?;
         let played =
             self.evaluator
                 .play_shard(spec, &bundle, &environment, out.path(), &mut progress)?;
@@ -241,6 +241,7 @@ impl Executor {
         })
     }
 
+    /// `game` is the game's id and the number of the attempt.
     fn broadcast(
         &self,
         lease: &Lease,
@@ -277,7 +278,7 @@ impl Executor {
             self.host
                 .environment_on(second_cpus, &second.limits, broadcast.progress()),
         ];
-        let out = self.folder("game")?;
+        let out = self.temporary_folder("game")?;
         let played = self.evaluator.play_game(
             spec,
             bundles.each_ref(),

@@ -1,4 +1,5 @@
-//! Handling of full disks. An interrupted job is repeated without counting the attempt, and no job starts meanwhile.
+//! Handling of full disks. A job that a full disk interrupts is repeated, and the attempt does not count. While free space is short, the
+//! slots of the server's process claim no job.
 
 use faceoff_runner::{PlatformFault, bundle::BundleError};
 use faceoff_store::{Store, StoreError};

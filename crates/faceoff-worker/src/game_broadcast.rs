@@ -7,7 +7,7 @@ use faceoff_types::{GameId, LiveEvent, LivePosition};
 use faceoff_wire::{job::Lease, remote::LiveGameUpdate};
 use std::sync::Arc;
 
-/// Publishes live updates of a running game, and reports its progress to the lease keeper, until it is dropped.
+/// Publishes live updates of a running game, and reports its progress to the lease keeper. The drop publishes the end of the attempt.
 pub(crate) struct GameBroadcast {
     server: Arc<dyn JobServer>,
     lease: Lease,

@@ -15,7 +15,8 @@ use std::{
 };
 use tokio_util::sync::CancellationToken;
 
-/// How often the keeper checks for progress, which it reports at once, so that progress bars move.
+/// How often the keeper looks for new progress. It reports progress at once, without waiting for the next renewal, so that progress bars
+/// move.
 const PROGRESS_TICK: Duration = Duration::from_secs(1);
 
 /// Keeps the lease of a job while a slot runs it. A thread renews the lease, reports progress and notices the loss of the
@@ -24,6 +25,7 @@ const PROGRESS_TICK: Duration = Duration::from_secs(1);
 #[derive(Debug)]
 pub(crate) struct LeaseKeeper {
     progress: Progress,
+    /// Cancelled when the job is done, and at the shutdown.
     job_done: CancellationToken,
     /// `None` only while it is being dropped.
     thread: Option<JoinHandle<()>>,
@@ -34,6 +36,7 @@ pub(crate) struct LeaseKeeper {
 pub(crate) struct Progress {
     /// Number of finished episodes of a shard; in a game, of finished windows of [`WINDOW_STEPS`] control steps.
     episodes_done: Arc<AtomicU32>,
+    /// Cancelled by the keeper when the slot must stop the job.
     stop: CancellationToken,
 }
 
@@ -117,7 +120,8 @@ fn keep_lease(
     let interval = server.renewal_interval(lease);
     let mut reported_episodes = 0;
     let mut renewed_at = Instant::now();
-    let mut failing = false;
+    // Only the first of several failures in a row is logged.
+    let mut last_renewal_failed = false;
     loop {
         // Without a queue version, new jobs do not end the wait.
         let queue_version = None;
@@ -140,7 +144,7 @@ fn keep_lease(
             Ok(LeaseStatus::Held) => {
                 reported_episodes = episodes_done;
                 renewed_at = Instant::now();
-                failing = false;
+                last_renewal_failed = false;
             }
             Ok(LeaseStatus::Lost) => {
                 progress.stop.cancel();
@@ -148,10 +152,10 @@ fn keep_lease(
             }
             // The next tick tries again. If the lease expires meanwhile, the commit notices it.
             Err(error) => {
-                if !failing {
+                if !last_renewal_failed {
                     tracing::warn!(job = %lease.job_id, cause = format!("{error:#}"), "the lease was not renewed; trying again");
                 }
-                failing = true;
+                last_renewal_failed = true;
             }
         }
     }

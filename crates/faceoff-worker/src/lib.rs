@@ -1,7 +1,8 @@
 //! Workers and the daily schedule. A *worker* is a process that runs jobs (validation runs, shards of evaluations, games,
 //! scorings). It has *slots*, each of which runs one job at a time: the slot leases a job, runs its agents through
 //! `faceoff-runner` and commits the result. A slot gets its jobs (`faceoff-wire`) through the trait `JobServer`, and
-//! their files through the trait `FileStore`; the implementations for the server's own process use the store.
+//! their files through the trait `FileStore`, in the modules `server` and `files`. `local` and `local_files` implement them on the
+//! store, for slots in the server's own process; `remote` over the network, for workers on other machines.
 //!
 //! A slot is a named operating-system thread: physics and the agent's pipes block, so they must not share a thread with
 //! the server's async tasks. A job is leased for seconds and the lease is renewed while the job runs, so another slot
@@ -28,8 +29,8 @@ mod schedule;
 mod scorer;
 mod scratch;
 mod server;
-mod service;
 mod slot;
+mod slot_supervisor;
 mod slot_threads;
 #[cfg(test)]
 mod tests;
@@ -45,5 +46,5 @@ pub use remote::{
     dispatch, run_remote_worker,
 };
 pub use schedule::{run_schedule, update_due_days};
-pub use service::{SlotsConfig, WorkerConfig, run};
+pub use slot_supervisor::{SlotsConfig, WorkerConfig, run};
 pub use slot_threads::{SlotStarter, SlotThreads};

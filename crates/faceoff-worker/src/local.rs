@@ -36,6 +36,7 @@ pub(crate) struct LocalServer {
     pub(crate) store: Store,
     /// State of running games and remote workers, shown to viewers and organisers.
     pub(crate) live: LiveState,
+    /// The async runtime on which the threads of slots call the store.
     pub(crate) runtime: Handle,
     pub(crate) clock: Clock,
     /// Duration of a lease without renewal, seconds.
@@ -43,6 +44,7 @@ pub(crate) struct LocalServer {
     pub(crate) simulator: Arc<dyn Simulator>,
     /// The server's limits of agents; a stage may have others.
     pub(crate) limits: AgentLimits,
+    /// Keeps slots from claiming jobs while disk space is short.
     pub(crate) claim_pause: ClaimPause,
     /// The kinds of jobs that its slots claim.
     pub(crate) job_filter: JobFilter,
@@ -72,7 +74,8 @@ impl LocalServer {
         }
     }
 
-    /// A validation run like an evaluation of the stage; without one, like an evaluation by the server's settings.
+    /// A validation run under the rules of the stage to which the submission belongs, so that the agent cannot distinguish it from an
+    /// evaluation. Without a stage (`None`), under the defaults of the competition.
     fn validation_spec(
         &self,
         ruleset_and_plan: Option<(Ruleset, RunPlan)>,
@@ -234,7 +237,7 @@ impl LocalServer {
     ) -> anyhow::Result<LeaseStatus> {
         let (recording, now) = (commit.recording.clone(), self.clock.now());
         let status = lease_status(self.store.commit_shard(claim, commit, now).await?);
-        // Runs with recordings are scored; the others end with their last shard.
+        // Runs with recordings get their summaries when they are scored. The others end with their last shard.
         if status == LeaseStatus::Held && recording.is_none() {
             episode_summaries::store_missing(&self.store, self.competition(), now).await;
         }
@@ -266,7 +269,7 @@ impl LocalServer {
                 (CommitOutcome::Stored, Some((game_prefix, _))) => {
                     artifacts.delete_others(game_prefix, &key).await
                 }
-                // After a repeated commit, another attempt may have started since.
+                // Another attempt may have started since the first commit, so no other recordings are removed.
                 (CommitOutcome::Stored | CommitOutcome::AlreadyStored, _) => Ok(()),
                 (CommitOutcome::LeaseLost, _) => artifacts.delete_folder(&key).await,
             };
@@ -336,7 +339,7 @@ impl JobServer for LocalServer {
     }
 
     fn renew(&self, lease: &Lease, episodes_done: u32) -> anyhow::Result<LeaseStatus> {
-        let claim = claim(lease, &lease.holder);
+        let claim = to_claim(lease, &lease.holder);
         let renewed = self
             .store
             .heartbeat(&claim, episodes_done, self.lease_s, self.clock.now());
@@ -352,7 +355,7 @@ impl JobServer for LocalServer {
     }
 
     fn commit(&self, lease: &Lease, report: JobReport) -> anyhow::Result<LeaseStatus> {
-        let (claim, now) = (claim(lease, &lease.holder), self.clock.now());
+        let (claim, now) = (to_claim(lease, &lease.holder), self.clock.now());
         self.runtime.block_on(async {
             match report {
                 JobReport::Validation(outcome) => {
@@ -398,7 +401,7 @@ impl JobServer for LocalServer {
     }
 
     fn release(&self, lease: &Lease, reason: ReleaseReason<'_>) -> anyhow::Result<()> {
-        let (claim, now) = (claim(lease, &lease.holder), self.clock.now());
+        let (claim, now) = (to_claim(lease, &lease.holder), self.clock.now());
         Ok(self.runtime.block_on(async {
             match reason {
                 ReleaseReason::Interrupted => self.store.release(&claim, now).await,
@@ -460,8 +463,8 @@ fn game_recording(files: GameFiles) -> GameRecording {
     }
 }
 
-/// The store's form of a lease, in the name of `holder`.
-pub(crate) fn claim(lease: &Lease, holder: &str) -> JobClaim {
+/// The store's form of a lease, with `holder` as its holder.
+pub(crate) fn to_claim(lease: &Lease, holder: &str) -> JobClaim {
     JobClaim {
         job: lease.job_id,
         nonce: lease.nonce,

@@ -6,10 +6,11 @@ use faceoff_types::BundleRef;
 use std::path::Path;
 use tokio::runtime::Handle;
 
-/// The artifacts of the store, for threads of slots.
+/// The artifacts (stored files) of the store, for the threads of slots.
 #[derive(Debug, Clone)]
 pub(crate) struct LocalFiles {
     pub(crate) artifacts: Artifacts,
+    /// The async runtime on which these threads wait for the artifacts.
     pub(crate) runtime: Handle,
 }
 

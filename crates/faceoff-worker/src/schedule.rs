@@ -24,24 +24,24 @@ pub async fn run_schedule(
     clock: Clock,
     shutdown: CancellationToken,
 ) -> anyhow::Result<()> {
-    let mut failed = false;
+    let mut last_update_failed = false;
     loop {
         let now = clock.now();
         let next_start =
             match update_due_days_unless_behind(&store, &competition, &clock, now).await {
                 Ok(next_start) => {
-                    failed = false;
+                    last_update_failed = false;
                     next_start
                 }
                 Err(error) => {
                     // Logged once, since it recurs every second.
-                    if !failed {
+                    if !last_update_failed {
                         tracing::error!(
                             error = format!("{error:#}"),
                             "days could not be ended or started; trying again"
                         );
                     }
-                    failed = true;
+                    last_update_failed = true;
                     None
                 }
             };
@@ -55,8 +55,8 @@ pub async fn run_schedule(
     }
 }
 
-/// As [`update_due_days`], but nothing is due as long as the clock is before the newest change of the database, because the time
-/// is not known then.
+/// As [`update_due_days`], but nothing is due as long as the clock is behind the newest change in the database: the clock must be wrong
+/// then, so the time is not known.
 pub(crate) async fn update_due_days_unless_behind(
     store: &Store,
     competition: &Competition,

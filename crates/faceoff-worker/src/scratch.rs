@@ -14,7 +14,9 @@ use uuid::Uuid;
 #[derive(Debug)]
 pub(crate) struct Scratch {
     folder: PathBuf,
+    /// See [`Self::worker()`].
     worker: String,
+    /// Locked as long as this value exists.
     _lock: File,
 }
 

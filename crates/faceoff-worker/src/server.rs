@@ -53,7 +53,7 @@ pub(crate) enum ClaimResult {
     Job(Box<JobSpec>),
     /// No job can be claimed now.
     Empty {
-        /// Version of the queue before the claim, so that no later addition is missed.
+        /// Version of the queue before the claim. [`JobServer::wait`] with it misses no job that was added since.
         queue_version: QueueVersion,
     },
 }

@@ -53,14 +53,14 @@ pub(crate) struct Slot {
 impl Slot {
     /// Runs jobs until the shutdown.
     pub(crate) fn run(mut self) {
-        // Did the last claim fail? Only the first of several failures in a row is logged.
-        let mut failing = false;
+        // Only the first of several failures in a row is logged.
+        let mut last_claim_failed = false;
         // Platform faults in a row.
         let mut faults = 0;
         while !self.shutdown.is_cancelled() {
             let queue_version = match self.server.claim(&self.name) {
                 Ok(ClaimResult::Job(job)) => {
-                    failing = false;
+                    last_claim_failed = false;
                     match self.run_job(&job) {
                         JobEnd::Committed => faults = 0,
                         JobEnd::PlatformFault => {
@@ -72,17 +72,17 @@ impl Slot {
                     continue;
                 }
                 Ok(ClaimResult::Empty { queue_version }) => {
-                    failing = false;
+                    last_claim_failed = false;
                     Some(queue_version)
                 }
                 Err(error) => {
-                    if !failing {
+                    if !last_claim_failed {
                         tracing::error!(
                             cause = format!("{error:#}"),
                             "cannot claim a job; trying again"
                         );
                     }
-                    failing = true;
+                    last_claim_failed = true;
                     None
                 }
             };
@@ -197,14 +197,14 @@ impl Slot {
         progress: &Progress,
     ) -> anyhow::Result<LeaseStatus> {
         let id = job.lease.job_id;
-        let mut is_logged = false;
+        let mut is_full_disk_logged = false;
         loop {
             let committed = self.server.commit(&job.lease, report.clone());
             match committed {
                 Err(error) if self.server.is_full_disk(&error) && !progress.must_stop() => {
-                    if !is_logged {
+                    if !is_full_disk_logged {
                         tracing::warn!(job = %id, cause = format!("{error:#}"), "disk full: waiting to commit");
-                        is_logged = true;
+                        is_full_disk_logged = true;
                     }
                     self.server.wait(&self.shutdown, self.idle_poll, None);
                 }

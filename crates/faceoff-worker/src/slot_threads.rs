@@ -42,7 +42,7 @@ enum Starter {
 pub struct SlotStarter(Receiver<StartRequest>);
 
 impl SlotThreads {
-    /// Threads are started by the calling thread.
+    /// Threads are started by the thread that calls [`Self::start`].
     #[must_use]
     pub const fn from_caller() -> Self {
         Self(Starter::CallingThread)

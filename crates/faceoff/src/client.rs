@@ -6,12 +6,12 @@
 
 mod archive;
 mod download;
+mod download_links;
 mod evaluations;
 mod files;
 mod game;
 mod http;
-mod links;
-mod pages;
+mod pagination;
 mod proposals;
 mod sessions;
 mod sse;
@@ -25,6 +25,7 @@ mod workers;
 
 use anyhow::{Context, bail};
 pub use download::DownloadedFile;
+pub use download_links::LinkTarget;
 use faceoff_api::{
     API_BASE,
     requests::{BoardFormat, BoardQuery, CloseSeason, Confirmation, Reason},
@@ -36,7 +37,6 @@ use faceoff_api::{
 use faceoff_types::{Task, url_without_password};
 use http::Address;
 pub use http::{is_this_machine, server_address};
-pub use links::LinkTarget;
 use reqwest::{Method, RequestBuilder, Response, StatusCode, header};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 pub use sse::ServerEvent;
@@ -63,7 +63,7 @@ pub struct ApiError {
     pub detail: String,
 }
 
-/// The server has refused with this status.
+/// Is the error a refusal by the server with this status?
 pub fn is_refused_with(error: &anyhow::Error, status: StatusCode) -> bool {
     error
         .downcast_ref::<ApiError>()
@@ -100,7 +100,8 @@ fn is_temporary(error: &anyhow::Error) -> bool {
     }
 }
 
-/// Repeats a request that only reads while its failures are temporary, for at most `retry_timeout`.
+/// Repeats a request while its failures are temporary, for at most `retry_timeout`. Only for requests that change nothing on the server,
+/// since a failed request may have been carried out.
 ///
 /// # Errors
 /// The last failure.
@@ -249,7 +250,7 @@ impl Client {
         self.request_by(&self.http, method, path)
     }
 
-    /// A request that another HTTP client sends.
+    /// A request through `http`, an HTTP client with other timeouts than this client's own.
     fn request_by(&self, http: &reqwest::Client, method: Method, path: &str) -> RequestBuilder {
         let request = http.request(method, format!("{}{API_BASE}{path}", self.address.base));
         match &self.token {

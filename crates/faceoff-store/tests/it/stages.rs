@@ -1,4 +1,5 @@
-//! Stages (parts of the season with their own rules, days and boards): days, and revisions of the rules.
+//! Stages (parts of the season with their own rules, evaluation days and boards): the date of a day and when it may start, revisions
+//! (numbered versions of a stage's rules, each with its own board), and the first stage, which the server's configuration creates.
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -50,10 +51,10 @@ async fn stages_have_their_own_days_seeds_and_boards() {
         assert_eq!(started.len(), 1);
         assert_eq!(started[0].stage_day, StageDay { stage, date });
         assert_eq!(started[0].submission, submission.id);
-        let repeated = start_day(&f, stage).await;
+        let second_start = start_day(&f, stage).await;
         assert!(
-            matches!(repeated, Err(StoreError::CutoffPassed { .. })),
-            "{repeated:?}"
+            matches!(second_start, Err(StoreError::CutoffPassed { .. })),
+            "a stage has one evaluation day per date: {second_start:?}"
         );
         let claimed = f.claim().await.unwrap();
         let Job::Shard {
@@ -74,7 +75,7 @@ async fn stages_have_their_own_days_seeds_and_boards() {
         assert_eq!(board[0].result.score, score);
         assert!(
             board[0].released_at.is_some(),
-            "the day of the other stage does not matter"
+            "a day is released without waiting for the other stage's day"
         );
     }
     assert_ne!(seeds[0], seeds[1]);
@@ -105,7 +106,7 @@ async fn day_is_the_date_in_the_stages_zone() {
         date(2026, 3, 1)
     );
     f.run_all_with_score(1.0).await;
-    // Midnight in Auckland is 11:00 UTC.
+    // A date has at most one evaluation day. Midnight in Auckland, where the next date begins, is 11:00 UTC.
     f.now = time("2026-03-01T10:59:59Z");
     assert!(matches!(
         start_day(&f, stage).await,
@@ -252,6 +253,7 @@ async fn settings_change_creates_no_revision() {
 #[tokio::test]
 async fn first_stage_follows_configuration_until_changed() {
     let mut f = TestStore::new().await;
+    // What a start of the server does with the first stage's part of its configuration.
     let configure = async |f: &TestStore, plan: &RunPlan| {
         let (rules, settings) = rules_and_settings(plan);
         let change = f
@@ -284,6 +286,7 @@ async fn first_stage_follows_configuration_until_changed() {
         rules: Some(first[0].rules.rules.clone()),
         ..StageChange::default()
     };
+    // After an organiser's change the configuration no longer applies.
     let changed = change_stage(&f, first[0].id, request).await.unwrap();
     assert_eq!((changed.rules.number, changed.configured), (3, false));
     assert_eq!(configure(&f, &one_shard_plan()).await, [changed]);

@@ -44,7 +44,7 @@ async fn submission_reaches_board_after_upload_and_runs() {
         let progress = running(f.state(evaluation.id).await);
         assert_eq!(progress.episodes_done, EPISODES_PER_SHARD * shards_done);
         assert_eq!(progress.commits.len(), shards_done as usize);
-        // The worker reports that it has completed one episode.
+        // The worker reports that it has completed one episode. Teams see only episodes of committed shards.
         assert!(f.store.heartbeat(&claim, 1, LEASE_S, f.now).await.unwrap());
         let progress = running(f.state(evaluation.id).await);
         assert_eq!(progress.episodes_done, EPISODES_PER_SHARD * shards_done + 1);
@@ -57,7 +57,7 @@ async fn submission_reaches_board_after_upload_and_runs() {
         assert_eq!(f.commit_shard(&claim, &shard).await, CommitOutcome::Stored);
         played.push((shard.task, shard.first_episode, shard.end_episode));
     }
-    // They are claimed in an order that is drawn.
+    // Shards are claimed in a random order, so they are sorted before the comparison.
     let all: Vec<_> = TASKS
         .into_iter()
         .flat_map(|task| [(task, 0, 2), (task, 2, 4)])
@@ -130,7 +130,7 @@ async fn submission_reaches_board_after_upload_and_runs() {
     assert_eq!(board[0].result, result(51.2));
 }
 
-/// The progress of a running evaluation with all its shards.
+/// The progress of an evaluation, which must be running with [`SHARDS`] shards.
 fn running(state: EvaluationState) -> RunProgress {
     let EvaluationState::Running {
         progress,

@@ -208,7 +208,7 @@ async fn operator_token_follows_its_file_and_stays_revoked() {
 }
 
 #[tokio::test]
-async fn creators_missing_in_earlier_versions_come_from_the_log() {
+async fn migration_takes_missing_creators_from_the_event_log() {
     let f = TestStore::new().await;
     let team = f.create_team("Alpha").await;
     let owner = TokenOwner::Team(team.id);
@@ -260,7 +260,7 @@ async fn creators_missing_in_earlier_versions_come_from_the_log() {
     let link = f.store.invite(Actor::User(second), link(30), f.now).await;
     let link = link.unwrap();
 
-    // As the earlier version left them.
+    // As an earlier version left them. The migration takes the creators from the log of events, and limits password links to a day.
     let mut connection = f.connection().await;
     let mut execute = async |sql: &str| {
         sqlx::raw_sql(sqlx::AssertSqlSafe(sql.to_owned()))
@@ -308,7 +308,7 @@ async fn tokens_and_invitations_are_listed_page_by_page() {
     let ada = add_user(&f, 100, "Ada", InvitationRole::Member(teams[0])).await;
     let mut created = Vec::new();
     for hash in 1..=9 {
-        // Several are created at one time.
+        // Some are created at the same time as the one before, where the order by time alone would not be unique.
         f.advance_clock_s(i64::from(hash % 2));
         let owner = match hash % 3 {
             0 => TokenOwner::User(ada.id),
@@ -347,7 +347,7 @@ async fn tokens_and_invitations_are_listed_page_by_page() {
         }
         assert_eq!(found, expected, "{of:?}");
     }
-    // A token of another team, and one that does not exist.
+    // A page cannot start after a token of another team, or after one that does not exist.
     let of_alpha = TokenFilter::Member(ada.id, teams[0]);
     for after in [created[1].id, TokenId::new()] {
         let page = f
@@ -391,7 +391,7 @@ async fn tokens_and_invitations_are_listed_page_by_page() {
         .chain(&second)
         .map(|listed| listed.id)
         .collect();
-    // Ada's own one, already accepted, is the oldest.
+    // The fourth and oldest is the invitation that Ada has accepted.
     assert_eq!(listed[..3], to_alpha);
     assert_eq!(listed.len(), 4);
     let page = f
@@ -422,16 +422,16 @@ async fn ended_credentials_are_deleted_after_a_month() {
             .id
     };
     let root = create(&f, 1, None).await;
-    let middle = create(&f, 2, Some((root, [1; 32]))).await;
-    let next = create(&f, 9, Some((middle, [2; 32]))).await;
-    let leaf = create(&f, 3, Some((next, [9; 32]))).await;
-    for ended in [middle, next] {
+    let child = create(&f, 2, Some((root, [1; 32]))).await;
+    let grandchild = create(&f, 9, Some((child, [2; 32]))).await;
+    let leaf = create(&f, 3, Some((grandchild, [9; 32]))).await;
+    for ended in [child, grandchild] {
         f.store
             .revoke_token(Actor::Operator, ended, RevocationExtent::TokenOnly, f.now)
             .await
             .unwrap();
     }
-    // A revoked token in the file of a data folder must not become valid again.
+    // The revoked operator's token stays: if it were deleted, the next start would make its secret, which is in a file, valid again.
     assert!(f.store.set_operator_token([7; 32], f.now).await.unwrap());
     let of_operator = f.store.verify_token([7; 32], TokenKind::ApiToken, f.now);
     let of_operator = of_operator.await.unwrap().unwrap().token.id;
@@ -462,6 +462,7 @@ async fn ended_credentials_are_deleted_after_a_month() {
         .await
         .unwrap();
 
+    // The two revoked tokens are deleted after 30 days. Token and invitation that expired an hour later follow an hour later.
     f.advance_clock_s(30 * 24 * 3600 - 1);
     assert_eq!(f.store.delete_ended_credentials(f.now).await.unwrap(), 0);
     f.advance_clock_s(1);
@@ -476,7 +477,7 @@ async fn ended_credentials_are_deleted_after_a_month() {
         .filter(|token| token.owner == TokenOwner::Team(team))
         .map(|token| token.id)
         .collect();
-    // The third one is that of the team's creation.
+    // The third one is the token that the team got when it was created.
     assert_eq!((of_team.len(), &of_team[..2]), (3, &[leaf, root][..]));
     let invitations = all_invitations(&f).await;
     let [accepted] = invitations.as_slice() else {
@@ -484,7 +485,7 @@ async fn ended_credentials_are_deleted_after_a_month() {
     };
     assert!(matches!(accepted.state, InvitationState::Accepted { .. }));
     assert!(!f.store.set_operator_token([7; 32], f.now).await.unwrap());
-    // A token that was created with a deleted token still ends with the token with which the deleted one was created.
+    // The tokens between them are deleted, and revoking the root with all that was created with it still revokes the leaf.
     f.store
         .revoke_token(
             Actor::Operator,

@@ -1,4 +1,6 @@
-//! Tournaments: entrants, rounds, games and their attempts, friendly games, and schedule replays.
+//! Tournaments: entrants, rounds, games and their attempts (each start of a game is one), test games against the baseline (an opponent
+//! that the organisers choose), friendly games between two teams, and schedule replays (all games played once more, to estimate how
+//! much the result owes to chance).
 
 use crate::fixture::*;
 use faceoff_store::*;
@@ -6,6 +8,7 @@ use faceoff_types::*;
 use proptest::prelude::*;
 use serde_json::json;
 
+/// Of voided games, pauses and departures.
 const REASON: &str = "the table was tilted";
 
 fn round(number: u32) -> RoundNumber {
@@ -33,7 +36,7 @@ async fn tournament_of(
     (opened.unwrap(), teams)
 }
 
-/// A round as it was drawn. `byes` has the team without a game of each matchday, in their order.
+/// A drawn round: the games of each matchday, and the team that has none on it (`byes`, one per matchday).
 fn drawn(number: u32, matchdays: &[&[[TeamId; 2]]], byes: &[TeamId]) -> DrawnRound {
     let mut matchdays: Vec<_> = matchdays
         .iter()
@@ -52,7 +55,7 @@ fn drawn(number: u32, matchdays: &[&[[TeamId; 2]]], byes: &[TeamId]) -> DrawnRou
     }
 }
 
-async fn start(
+async fn start_round(
     f: &TestStore,
     id: TournamentId,
     drawn: &DrawnRound,
@@ -64,7 +67,7 @@ async fn start(
 async fn one_game(f: &TestStore, rules: TournamentRules) -> (Tournament, Vec<TeamId>) {
     let (cup, teams) = tournament_of(f, &["A", "B"], rules).await;
     let round = drawn(1, &[&[[teams[0], teams[1]]]], &[]);
-    start(f, cup.id, &round).await.unwrap();
+    start_round(f, cup.id, &round).await.unwrap();
     (cup, teams)
 }
 
@@ -78,7 +81,7 @@ async fn three_games(f: &TestStore) -> (Tournament, [TeamId; 3]) {
     .await;
     let [a, b, c] = teams[..] else { panic!() };
     let round = drawn(1, &[&[[a, b]], &[[b, c]], &[[c, a]]], &[c, a, b]);
-    start(f, cup.id, &round).await.unwrap();
+    start_round(f, cup.id, &round).await.unwrap();
     (cup, [a, b, c])
 }
 
@@ -86,6 +89,7 @@ async fn record(f: &TestStore, id: TournamentId) -> TournamentRecord {
     f.store.tournament_record(id).await.unwrap()
 }
 
+/// The result of a game, as a worker commits it. Games of schedule replays have no recording.
 fn game_commit(recorded: bool) -> GameCommit {
     let hash = || "0".repeat(64);
     GameCommit {
@@ -99,7 +103,7 @@ fn game_commit(recorded: bool) -> GameCommit {
     }
 }
 
-/// Claims the next job, which must be a game.
+/// Claims the next job, which must be a game. The last number counts the game's attempts from 1.
 async fn claim_game(f: &TestStore) -> (JobClaim, GameId, u32) {
     match f.claim().await {
         Some(ClaimedJob {
@@ -135,9 +139,10 @@ async fn ban_requeues_running_games_and_lists_results() {
         [teams[1], teams[2]],
         [teams[2], teams[0]],
     ];
-    start(&f, cup.id, &drawn(1, &[&pairings], &[]))
+    start_round(&f, cup.id, &drawn(1, &[&pairings], &[]))
         .await
         .unwrap();
+    // The server claims a job for remote workers in advance, and transfers the lease to the worker that starts it.
     let begin = async |claim: &JobClaim, slot: &str| {
         let begins = f.store.transfer_lease(claim, slot, LEASE_S, f.now);
         assert!(begins.await.unwrap());
@@ -161,14 +166,14 @@ async fn ban_requeues_running_games_and_lists_results() {
     let games = f.store.results_of_worker(&rack, 10).await.unwrap().games;
     assert_eq!(games, [played], "organisers can find the game and void it");
 
-    // One result is pending, one game belongs to another worker.
-    let (pending, requeued) = claim_in_advance().await;
-    begin(&pending, "remote/rack-1/slot-0").await;
+    // Two games run: one on the worker that is banned before it commits, one on another worker.
+    let (to_ban, requeued) = claim_in_advance().await;
+    begin(&to_ban, "remote/rack-1/slot-0").await;
     let (other, _) = claim_in_advance().await;
     begin(&other, "remote/rack-2/slot-0").await;
     let ban = f.store.ban_worker(Actor::Server, &rack, REASON, f.now);
     ban.await.unwrap();
-    let late = f.store.commit_game(&pending, &commit, f.now);
+    let late = f.store.commit_game(&to_ban, &commit, f.now);
     assert_eq!(late.await.unwrap(), CommitOutcome::LeaseLost);
     assert_eq!(state(&f, requeued).await, GameState::Queued);
     let (reclaimed, game) = claim_in_advance().await;
@@ -207,15 +212,18 @@ async fn round_starts_once_and_ends_with_its_last_game() {
     let [a, b, c] = teams[..] else { panic!() };
     assert_eq!(cup.number, 1);
     let first = drawn(1, &[&[[a, b]], &[[b, c]], &[[c, a]]], &[c, a, b]);
-    let (one, two) = tokio::join!(start(&f, cup.id, &first), start(&f, cup.id, &first));
+    let (one, two) = tokio::join!(
+        start_round(&f, cup.id, &first),
+        start_round(&f, cup.id, &first)
+    );
     let lost = if one.is_ok() { two } else { one };
     assert_conflict(lost, &["round 1 has started already"]);
     assert_conflict(
-        start(&f, cup.id, &drawn(3, &[&[[a, b]]], &[c])).await,
+        start_round(&f, cup.id, &drawn(3, &[&[[a, b]]], &[c])).await,
         &["not the next one"],
     );
     assert_conflict(
-        start(&f, cup.id, &drawn(2, &[&[[a, b]]], &[c])).await,
+        start_round(&f, cup.id, &drawn(2, &[&[[a, b]]], &[c])).await,
         &["3 games of earlier rounds have no result"],
     );
     let started = record(&f, cup.id).await;
@@ -255,7 +263,7 @@ async fn round_starts_once_and_ends_with_its_last_game() {
     let team = f.store.team(a).await.unwrap();
     f.upload(&team).await;
     let newer = f.validate().await;
-    start(
+    start_round(
         &f,
         cup.id,
         &drawn(2, &[&[[b, a]], &[[c, b]], &[[a, c]]], &[c, a, b]),
@@ -303,7 +311,7 @@ async fn round_needs_a_valid_submission_of_each_team() {
         .unwrap();
     let round = drawn(1, &[&[[teams[0], late.id]]], &[teams[1]]);
     assert_conflict(
-        start(&f, cup.id, &round).await,
+        start_round(&f, cup.id, &round).await,
         &["Late", "Wait for them, or let them leave"],
     );
     assert!(record(&f, cup.id).await.rounds.is_empty());
@@ -317,9 +325,12 @@ async fn round_needs_a_valid_submission_of_each_team() {
         None,
         "before the first round it is only removed"
     );
-    assert_conflict(start(&f, cup.id, &round).await, &["have changed meanwhile"]);
+    assert_conflict(
+        start_round(&f, cup.id, &round).await,
+        &["have changed meanwhile"],
+    );
     let two = drawn(1, &[&[[teams[0], teams[1]]]], &[]);
-    start(&f, cup.id, &two).await.unwrap();
+    start_round(&f, cup.id, &two).await.unwrap();
     assert_conflict(
         f.store
             .add_entrants(Actor::Operator, cup.id, &[late.id], f.now)
@@ -337,7 +348,7 @@ async fn round_refuses_runtimes_that_rules_exclude() {
     };
     let (cup, teams) = tournament_of(&f, &["A", "B"], rules).await;
     assert_conflict(
-        start(&f, cup.id, &drawn(1, &[&[[teams[0], teams[1]]]], &[])).await,
+        start_round(&f, cup.id, &drawn(1, &[&[[teams[0], teams[1]]]], &[])).await,
         &["A, B"],
     );
 }
@@ -347,7 +358,7 @@ async fn game_with_platform_faults_has_attempts_but_no_result() {
     let mut f = TestStore::new().await;
     let (cup, teams) = one_game(&f, faceoff_airhockey::competition().tournament_rules()).await;
     let game = record(&f, cup.id).await.games[0].id;
-    // A slot that dies, one that shuts down, and platform faults until the game is given up.
+    // A slot that dies (its lease expires), one that shuts down, and platform faults until no more attempts are made.
     let (lost, _, _) = claim_game(&f).await;
     f.advance_clock_s(i64::from(LEASE_S) + 1);
     let (claim, _, attempt) = claim_game(&f).await;
@@ -405,7 +416,7 @@ async fn game_with_platform_faults_has_attempts_but_no_result() {
     assert_eq!((rerun.seed, rerun.state), (seed, GameState::Queued));
     run_next_game(&f).await;
     assert!(record(&f, cup.id).await.rounds[0].over_at.is_some());
-    // Its result counts until it is voided; then the game is rerun with the same rules.
+    // Its result counts until an organiser voids it; then the game can be rerun once.
     let voided = f
         .store
         .void_game(Actor::Operator, game, REASON, f.now)
@@ -419,7 +430,7 @@ async fn game_with_platform_faults_has_attempts_but_no_result() {
         (AttemptOutcome::Played, Some(REASON))
     );
     assert_conflict(
-        start(&f, cup.id, &drawn(2, &[&[[teams[1], teams[0]]]], &[])).await,
+        start_round(&f, cup.id, &drawn(2, &[&[[teams[1], teams[0]]]], &[])).await,
         &["have no result"],
     );
     assert_conflict(
@@ -586,7 +597,7 @@ async fn departure_cancels_open_games() {
             .count(),
         1
     );
-    start(&f, cup.id, &drawn(2, &[&[[b, a]]], &[]))
+    start_round(&f, cup.id, &drawn(2, &[&[[b, a]]], &[]))
         .await
         .unwrap();
     assert_conflict(
@@ -605,13 +616,13 @@ async fn round_ends_after_rerun_of_a_game_of_an_earlier_round() {
     let (cup, teams) = tournament_of(&f, &["A", "B", "C"], rules).await;
     let [a, b, c] = teams[..] else { panic!() };
     let first = drawn(1, &[&[[a, b]], &[[b, c]], &[[c, a]]], &[c, a, b]);
-    start(&f, cup.id, &first).await.unwrap();
+    start_round(&f, cup.id, &first).await.unwrap();
     let played = run_next_game(&f).await;
     for _ in 0..2 {
         run_next_game(&f).await;
     }
     let second = drawn(2, &[&[[b, a]], &[[c, b]], &[[a, c]]], &[c, a, b]);
-    start(&f, cup.id, &second).await.unwrap();
+    start_round(&f, cup.id, &second).await.unwrap();
     f.store
         .void_game(Actor::Operator, played, REASON, f.now)
         .await
@@ -627,7 +638,7 @@ async fn round_ends_after_rerun_of_a_game_of_an_earlier_round() {
         round(2),
         "it keeps its results of the first round"
     );
-    // The game of B and A in the second round is open, and the voided one of the first round.
+    // Two games are open now: B against A in the second round, and the voided one of the first round, which is rerun.
     f.store
         .rerun_game(Actor::Operator, played, f.now)
         .await
@@ -660,7 +671,7 @@ async fn withdrawn_team_plays_the_round_to_its_end() {
     assert_conflict(leave(&request).await, &["has left the tournament already"]);
     let next = drawn(2, &[&[[b, a]]], &[]);
     assert_conflict(
-        start(&f, cup.id, &next).await,
+        start_round(&f, cup.id, &next).await,
         &["2 games of earlier rounds have no result"],
     );
     for _ in 0..2 {
@@ -670,7 +681,7 @@ async fn withdrawn_team_plays_the_round_to_its_end() {
     assert!(after.rounds[0].over_at.is_some());
     let is_played = |game: &Game| matches!(game.state, GameState::Played(_));
     assert!(after.games.iter().all(is_played), "{:?}", after.games);
-    start(&f, cup.id, &next).await.unwrap();
+    start_round(&f, cup.id, &next).await.unwrap();
 }
 
 #[tokio::test]
@@ -683,7 +694,7 @@ async fn cancelled_game_of_an_earlier_round_is_not_waited_for() {
     let games = record(&f, cup.id).await.games;
     let of_c = games.iter().find(|game| game.teams.contains(&c)).unwrap();
     let second = drawn(2, &[&[[b, a]], &[[c, b]], &[[a, c]]], &[c, a, b]);
-    start(&f, cup.id, &second).await.unwrap();
+    start_round(&f, cup.id, &second).await.unwrap();
     f.store
         .void_game(Actor::Operator, of_c.id, REASON, f.now)
         .await
@@ -707,7 +718,7 @@ async fn cancelled_game_of_an_earlier_round_is_not_waited_for() {
 
 #[tokio::test]
 async fn withdrawal_does_not_delay_a_disqualification() {
-    for of_the_season in [false, true] {
+    for from_whole_season in [false, true] {
         let f = TestStore::new().await;
         let (cup, [_, _, c]) = three_games(&f).await;
         let request = departure(c, DepartureKind::Withdrawn, None);
@@ -718,7 +729,7 @@ async fn withdrawal_does_not_delay_a_disqualification() {
             left.await.unwrap().unwrap()
         };
         assert_eq!(leave(&request).await.from_round, round(2));
-        if of_the_season {
+        if from_whole_season {
             let decision = f.store.disqualify_team(Actor::Operator, c, REASON, f.now);
             decision.await.unwrap();
         } else {
@@ -732,7 +743,7 @@ async fn withdrawal_does_not_delay_a_disqualification() {
             (DepartureKind::Disqualified, round(1))
         );
         let open = after.games.iter().filter(|game| game.state.is_open());
-        assert_eq!(open.count(), 1, "its games are cancelled");
+        assert_eq!(open.count(), 1, "only the game without C is still open");
     }
 }
 
@@ -747,7 +758,7 @@ async fn disqualification_also_applies_after_withdrawal() {
     .await;
     let [a, b, c] = teams[..] else { panic!() };
     let first = drawn(1, &[&[[a, b]], &[[b, c]], &[[c, a]]], &[c, a, b]);
-    start(&f, cup.id, &first).await.unwrap();
+    start_round(&f, cup.id, &first).await.unwrap();
     for _ in 0..3 {
         run_next_game(&f).await;
     }
@@ -823,12 +834,13 @@ async fn friendly_games_have_a_quota_and_wait_for_rounds() {
         .leave_tournament(Actor::Operator, cup.id, &request, f.now)
         .await
         .unwrap();
-    let test = async |f: &TestStore, by| {
+    // A game of A against the baseline, requested by a team or (`None`) by the operator.
+    let test_game = async |f: &TestStore, by| {
         f.store
             .request_test_game(Actor::Operator, cup.id, a, by, f.now)
             .await
     };
-    assert_conflict(test(&f, None).await, &["has no baseline"]);
+    assert_conflict(test_game(&f, None).await, &["has no baseline"]);
     let baseline = f.store.active_submissions().await.unwrap();
     let baseline = baseline.iter().find(|one| one.team == base).unwrap().id;
     let change = TournamentChange {
@@ -848,7 +860,7 @@ async fn friendly_games_have_a_quota_and_wait_for_rounds() {
             .request_friendly_game(Actor::Team(by), cup.id, by, with, f.now)
             .await
     };
-    let tested = test(&f, Some(a)).await.unwrap();
+    let tested = test_game(&f, Some(a)).await.unwrap();
     assert_eq!(tested.submissions[1], baseline);
     assert_conflict(friendly(&f, a, a).await, &["cannot play itself"]);
     assert_conflict(
@@ -870,7 +882,7 @@ async fn friendly_games_have_a_quota_and_wait_for_rounds() {
         friendly(&f, a, b).await,
         Err(StoreError::GameQuotaExceeded { limit: 3, used: 3 })
     ));
-    test(&f, None).await.unwrap();
+    test_game(&f, None).await.unwrap();
     f.store
         .set_declines_friendly_games(Actor::Team(a), a, true, f.now)
         .await
@@ -887,10 +899,10 @@ async fn friendly_games_have_a_quota_and_wait_for_rounds() {
     assert_eq!(friendly_games.len(), 2, "one of them was cancelled");
     f.advance_clock_s(24 * 3600);
     assert_eq!(f.store.requested_games_on_day(a, f.now).await.unwrap(), 0);
-    start(&f, cup.id, &drawn(1, &[&[[a, b]]], &[]))
+    start_round(&f, cup.id, &drawn(1, &[&[[a, b]]], &[]))
         .await
         .unwrap();
-    assert_conflict(test(&f, None).await, &["a round is under way"]);
+    assert_conflict(test_game(&f, None).await, &["a round is under way"]);
     assert_conflict(friendly(&f, a, b).await, &["a round is under way"]);
     let record = record(&f, cup.id).await;
     assert_eq!(record.games.len(), 1);
@@ -915,7 +927,7 @@ async fn schedule_replay_has_new_seeds_and_does_not_count() {
             .await
     };
     assert_conflict(replay(1).await, &["0 of 1 rounds have started"]);
-    start(&f, cup.id, &drawn(1, &[&[[teams[0], teams[1]]]], &[]))
+    start_round(&f, cup.id, &drawn(1, &[&[[teams[0], teams[1]]]], &[]))
         .await
         .unwrap();
     assert_conflict(replay(1).await, &["1 games have no result yet"]);
@@ -979,7 +991,7 @@ async fn tournament_keeps_its_earlier_ruleset() {
         ..faceoff_airhockey::competition().tournament_rules()
     };
     one_game(&f, rules).await;
-    // A newer version starts.
+    // The server restarts with a version whose newest ruleset is a later one.
     let claimed = f.reopen().await.claim("slot 0", LEASE_S, f.now).await;
     let Some(ClaimedJob {
         job: Job::Game { rules, .. },
@@ -1013,7 +1025,7 @@ async fn closed_tournament_is_final_and_frees_bundles() {
             .await
     };
     assert_eq!(change().await.unwrap().rules.steps, 500);
-    start(&f, cup.id, &drawn(1, &[&[[teams[0], teams[1]]]], &[]))
+    start_round(&f, cup.id, &drawn(1, &[&[[teams[0], teams[1]]]], &[]))
         .await
         .unwrap();
     let other = TournamentChange {
@@ -1076,27 +1088,31 @@ async fn closed_tournament_is_final_and_frees_bundles() {
 }
 
 #[derive(Debug, Clone)]
-enum Action {
+/// What workers do with jobs. The numbers select one of the claims so far.
+enum WorkerAction {
     Claim,
     Commit(usize),
+    /// A platform fault.
     Fail(usize),
+    /// The worker shuts down and gives the job back.
     Release(usize),
+    /// All leases expire.
     Die,
 }
 
-fn actions() -> impl Strategy<Value = Vec<Action>> {
+fn actions() -> impl Strategy<Value = Vec<WorkerAction>> {
     let action = prop_oneof![
-        4 => Just(Action::Claim),
-        4 => (0..8_usize).prop_map(Action::Commit),
-        1 => (0..8_usize).prop_map(Action::Fail),
-        1 => (0..8_usize).prop_map(Action::Release),
-        1 => Just(Action::Die),
+        4 => Just(WorkerAction::Claim),
+        4 => (0..8_usize).prop_map(WorkerAction::Commit),
+        1 => (0..8_usize).prop_map(WorkerAction::Fail),
+        1 => (0..8_usize).prop_map(WorkerAction::Release),
+        1 => Just(WorkerAction::Die),
     ];
     prop::collection::vec(action, 0..40)
 }
 
 /// For any order of actions, each game has at most one result, and all have one in the end.
-async fn run_actions(actions: Vec<Action>) {
+async fn run_actions(actions: Vec<WorkerAction>) {
     let mut f = TestStore::new().await;
     let (cup, _) = three_games(&f).await;
     let mut claims: Vec<(JobClaim, GameId)> = Vec::new();
@@ -1104,7 +1120,7 @@ async fn run_actions(actions: Vec<Action>) {
     for action in actions {
         let pick = |number: usize| claims.get(number % claims.len().max(1)).cloned();
         match action {
-            Action::Claim => {
+            WorkerAction::Claim => {
                 if let Some(ClaimedJob {
                     claim,
                     job: Job::Game { game, .. },
@@ -1113,7 +1129,7 @@ async fn run_actions(actions: Vec<Action>) {
                     claims.push((claim, game));
                 }
             }
-            Action::Commit(number) => {
+            WorkerAction::Commit(number) => {
                 if let Some((claim, game)) = pick(number)
                     && f.store
                         .commit_game(&claim, &game_commit(true), f.now)
@@ -1124,7 +1140,7 @@ async fn run_actions(actions: Vec<Action>) {
                     *committed.entry(game).or_default() += 1;
                 }
             }
-            Action::Fail(number) => {
+            WorkerAction::Fail(number) => {
                 if let Some((claim, _)) = pick(number) {
                     f.store
                         .release_after_platform_fault(&claim, "a platform fault", f.now)
@@ -1132,12 +1148,12 @@ async fn run_actions(actions: Vec<Action>) {
                         .unwrap();
                 }
             }
-            Action::Release(number) => {
+            WorkerAction::Release(number) => {
                 if let Some((claim, _)) = pick(number) {
                     f.store.release(&claim, f.now).await.unwrap();
                 }
             }
-            Action::Die => f.advance_clock_s(i64::from(LEASE_S) + 1),
+            WorkerAction::Die => f.advance_clock_s(i64::from(LEASE_S) + 1),
         }
     }
     f.advance_clock_s(600);

@@ -1,4 +1,4 @@
-//! What a steady clock knows at its start.
+//! What a steady clock (one that does not follow steps of the system clock) knows at its start.
 
 use jiff::Timestamp;
 

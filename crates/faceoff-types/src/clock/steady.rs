@@ -18,7 +18,7 @@ const MAX_CORRECTION: f64 = 500e-6;
 /// How often the expected time is corrected.
 const CORRECTION_INTERVAL: SignedDuration = SignedDuration::from_secs(1);
 
-/// Values of `SignedDuration` are times since 1970 or readings of the monotonic clock.
+/// In this file a `SignedDuration` is a time since 1970, a reading of the monotonic clock (time since its zero), or a difference.
 pub(super) struct SteadyClock {
     system: Box<dyn Fn() -> Timestamp + Send + Sync>,
     monotonic: Box<dyn Fn() -> SignedDuration + Send + Sync>,
@@ -28,7 +28,7 @@ pub(super) struct SteadyClock {
 struct State {
     /// The server's time at the zero of the monotonic clock.
     zero: SignedDuration,
-    /// The same, without small steps that were followed recently. Deviations are measured from it, so that
+    /// Like `zero`, but it follows small steps only at the speed of [`MAX_CORRECTION`]. Deviations are measured from it, so that
     /// many small steps are noticed like a large one.
     expected_zero: SignedDuration,
     /// The monotonic clock at the last correction.
@@ -44,8 +44,8 @@ impl State {
         self.zero = zero;
         let elapsed = now.saturating_sub(self.corrected_at);
         if elapsed >= CORRECTION_INTERVAL {
-            let most = elapsed.mul_f64(MAX_CORRECTION);
-            let correction = deviation.clamp(-most, most);
+            let max_correction = elapsed.mul_f64(MAX_CORRECTION);
+            let correction = deviation.clamp(-max_correction, max_correction);
             self.expected_zero = self.expected_zero.saturating_add(correction);
             self.corrected_at = now;
         }
@@ -53,6 +53,7 @@ impl State {
 }
 
 #[derive(Clone, Copy)]
+/// The system clock is behind the newest change in the database: it must have been set back while no process ran.
 struct BehindDatabase {
     newest_change_at: Timestamp,
     /// How far the clock was behind at the start.
@@ -107,7 +108,8 @@ impl SteadyClock {
         let system_at = (self.system)();
         let after = (self.monotonic)().max(before);
         let system = system_at.as_duration();
-        // The thread may have been interrupted between the readings for any time, which is no deviation.
+        // The thread may have been interrupted between the readings for any time. So the zero is only known to be in a range, and
+        // a stored zero within this range is no deviation.
         let (earliest, latest) = (system.saturating_sub(after), system.saturating_sub(before));
         let zero = state.zero.clamp(earliest, latest);
         let deviation = zero.saturating_sub(state.expected_zero);

@@ -16,13 +16,13 @@ pub struct ClockStep {
     pub(super) zero_at: Timestamp,
 }
 
-/// What shows that the clock was set.
+/// The evidence that the clock was set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StepCause {
     /// The monotonic clock, which continues the server's time.
     MonotonicClock,
-    /// The newest change in the database: at its time the clock was later than at the start of this process. There is no
-    /// better time than the system clock's.
+    /// The newest change in the database is later than the system clock's time at the start of this process. The server uses the
+    /// system clock's time nevertheless, since it has no better one.
     NewestChange,
 }
 

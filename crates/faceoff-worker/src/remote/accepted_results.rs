@@ -157,7 +157,8 @@ impl Dispatcher {
         Ok(())
     }
 
-    /// Checks and stores a result, and returns how to acknowledge its message.
+    /// Checks and stores a result, and returns how to acknowledge its message: `Ack` if it is dealt with, `Term` if it is useless,
+    /// `Nak` to get it again after a delay.
     async fn accept(&self, message: &jetstream::Message) -> AckKind {
         let Some(worker) = names::worker_of(&message.subject) else {
             tracing::error!(subject = %message.subject, "a result from an unknown worker; ignored");
@@ -216,13 +217,13 @@ impl Dispatcher {
             *reason = printable_excerpt(reason, MAX_REASON_CHARS);
         }
         let has_failed = matches!(result.end, RemoteJobEnd::PlatformFault { .. });
-        let was_played = matches!(result.end, RemoteJobEnd::Done { .. });
+        let is_done = matches!(result.end, RemoteJobEnd::Done { .. });
         let record_failure = || {
             if let Some((jobs, until)) = workers.record_failure(worker.as_str(), id, now) {
                 tracing::warn!(%worker, jobs, %until, "all recent jobs of a worker failed; it gets none for a while");
             }
         };
-        // Dropped at the end of this function.
+        // Marks the result as being processed until the end of this function.
         let _processing = self.pending_results.start_processing(nonce);
         let acknowledgement = match self.check_within_limit(message, grant, result).await {
             // A repeated result has no effect.
@@ -232,7 +233,7 @@ impl Dispatcher {
             }
             Ok(Acceptance::Accepted) => {
                 workers.end_job(id);
-                if was_played {
+                if is_done {
                     workers.record_success(worker.as_str());
                 }
                 if has_failed {
@@ -252,7 +253,7 @@ impl Dispatcher {
                 AckKind::Ack
             }
             Ok(Acceptance::SimulationMismatch(difference)) => {
-                // It may quote the recording.
+                // The text may quote the recording, which the worker wrote.
                 let difference = printable_excerpt(&difference, MAX_REASON_CHARS);
                 let reason = format!("its recording differs from the simulation: {difference}");
                 match self.ban(&worker, &reason).await {
@@ -372,7 +373,7 @@ impl Dispatcher {
     }
 }
 
-/// The result of a finished check; without one, there is no error.
+/// The result of a check task; `None`, if there was no task, is no error.
 fn join_result(done: Option<Result<anyhow::Result<()>, JoinError>>) -> anyhow::Result<()> {
     done.map_or(Ok(()), |done| done?)
 }

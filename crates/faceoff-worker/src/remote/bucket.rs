@@ -59,7 +59,7 @@ pub(super) struct Bucket {
     bundles: Mutex<HashMap<String, Instant>>,
 }
 
-/// Makes `object_store` use the program's own HTTP client, with its trusted certificates.
+/// Makes the crate `object_store` use the program's own HTTP client, with its trusted certificates.
 struct Connector(reqwest::Client);
 
 impl fmt::Debug for Connector {
@@ -96,7 +96,7 @@ impl Bucket {
         })
     }
 
-    /// Checks that the bucket is reachable. Without the bucket, claimed jobs would only be released again.
+    /// Checks that the bucket is reachable, so that no jobs are claimed while it is not: they would only be released again.
     pub(super) async fn probe(&self) -> anyhow::Result<()> {
         match self.objects.head(&self.bundle_key("probe")).await {
             Ok(_) | Err(object_store::Error::NotFound { .. }) => Ok(()),

@@ -21,7 +21,7 @@ pub struct ConnectionCheck {
 /// Timeout for connecting.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Connects to NATS and asks the server, as a worker with this name would, without any side effects.
+/// Connects to NATS and asks the server whether a worker with this name and these capabilities would get jobs. Registers nothing.
 #[boxed]
 pub async fn check_connection(
     nats: &NatsConfig,

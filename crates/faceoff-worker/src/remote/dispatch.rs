@@ -15,9 +15,9 @@ use super::{
 };
 use crate::{
     boxed,
-    local::{LocalServer, claim},
+    local::{LocalServer, to_claim},
     server::{ClaimResult, JobServer},
-    service::WorkerConfig,
+    slot_supervisor::WorkerConfig,
 };
 use anyhow::Context as _;
 use async_nats::{
@@ -224,7 +224,7 @@ impl Supervisor<'_> {
             let cause = format!("{error:#}");
             if cause != logged_cause {
                 tracing::error!(cause, "cannot {operation}; trying again");
-                // While NATS is unreachable, problems that follow from it are not shown.
+                // While NATS is unreachable, all other operations fail, too; only this cause is shown.
                 let is_nats_down = self.workers.has_problem(REACH_NATS);
                 self.workers
                     .set_problem(operation, (!is_nats_down).then_some(&*cause));
@@ -252,7 +252,8 @@ pub(super) struct Dispatcher {
 }
 
 impl Dispatcher {
-    /// Publishes as many jobs as remote slots are waiting for, until the shutdown.
+    /// Publishes as many jobs as remote slots are waiting for, until the shutdown. It is woken by new jobs, by free slots, and after
+    /// [`POLL_INTERVAL`].
     async fn publish_jobs(&self, shutdown: &CancellationToken) -> anyhow::Result<()> {
         let (mut stream, mut consumer) = self.streams.jobs().await?;
         let mut checked_at = Instant::now();
@@ -264,8 +265,8 @@ impl Dispatcher {
         let mut signal = self.server.store.job_signal();
         while !shutdown.is_cancelled() {
             signal.borrow_and_update();
-            let late = self.published_jobs.take_late(Instant::now());
-            self.requeue_jobs(late, Some(&stream)).await;
+            let not_started_in_time = self.published_jobs.take_late(Instant::now());
+            self.requeue_jobs(not_started_in_time, Some(&stream)).await;
             let info = consumer
                 .info()
                 .await
@@ -361,7 +362,7 @@ impl Dispatcher {
 
     async fn requeue_job(&self, lease: Lease) {
         let (store, id, now) = (&self.server.store, lease.job_id, self.server.clock.now());
-        let claim = claim(&lease, NOT_STARTED);
+        let claim = to_claim(&lease, NOT_STARTED);
         match store.release_unstarted(&claim, now).await {
             Ok(true) => tracing::debug!(job = %id, "requeued: not started in time"),
             Ok(false) => {}

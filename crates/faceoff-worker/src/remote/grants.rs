@@ -13,7 +13,7 @@ use faceoff_wire::{
     remote::{RemoteJobEnd, ResultMessage},
 };
 
-/// The grant for a job. `program` is the hash of the server's program, which the worker must have, too.
+/// The grant for a job. `program_blake3` is the hash of the server's program, which the worker must have, too.
 pub(super) fn grant_for(job: &JobSpec, program_blake3: &str) -> Grant {
     let (bundles, write_scope, expected_recording) = match &job.payload {
         JobPayload::Shard {
@@ -128,7 +128,7 @@ fn store_report(
         server.release(lease, reason)?;
         return Ok(Acceptance::JobMismatch);
     }
-    // If the lease is over, the result is already stored or will be refused. It is not checked, since its files may be gone.
+    // If the lease has ended, the result is already stored or will be refused. It is not checked, since its files may be gone.
     if server.is_held(lease)? {
         if !server.live.workers.close_files(lease.nonce) {
             return Ok(Acceptance::FilesPending);

@@ -14,7 +14,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// How long a request for a job stays open before it is repeated, since a request may die silently. With this short time no
+/// How long a request for a job stays open before it is repeated, since NATS may lose a request without an error. With this short time no
 /// NATS heartbeats are needed: a `Batch` of async-nats (0.51) that has read a heartbeat is not woken by the next message,
 /// so the job would be lost.
 const REQUEST_OPEN_FOR: Duration = Duration::from_secs(5);

@@ -42,7 +42,7 @@ impl PublishedJobs {
     pub(super) fn set_published(&self, nonce: Uuid, sequence: u64, now: Instant) {
         if let Some(job) = self.all().get_mut(&nonce) {
             job.sequence = Some(sequence);
-            // No worker could start the job before.
+            // Workers receive the job only now, so the timeout begins again.
             job.waiting_since = now;
         }
     }

@@ -7,7 +7,7 @@ use super::{
     published_jobs::PublishedJobs,
     streams::Streams,
 };
-use crate::{game_broadcast::show_update, local::claim};
+use crate::{game_broadcast::show_update, local::to_claim};
 use async_nats::{Client, Message};
 use faceoff_live::{LiveState, SlotReport, WorkerInfo};
 use faceoff_store::{Store, StoreError};
@@ -154,7 +154,7 @@ impl RequestHandler {
                 let reason = ban
                     .or_else(|| incompatibility(&capabilities, &self.required))
                     .or_else(backoff)
-                    // It may quote the worker.
+                    // The reason may quote the worker's runtimes, which come from outside.
                     .map(|reason| printable_excerpt(&reason, MAX_REFUSAL_CHARS));
                 let info = worker_info(&capabilities);
                 let workers = &self.live.workers;
@@ -215,7 +215,7 @@ impl RequestHandler {
         lease: &Lease,
         slot: &str,
     ) -> Result<bool, StoreError> {
-        let claim = claim(lease, NOT_STARTED);
+        let claim = to_claim(lease, NOT_STARTED);
         let now = self.clock.now();
         let holder = worker.slot_holder(slot);
         let is_started = self
@@ -235,7 +235,7 @@ impl RequestHandler {
         Ok(is_started)
     }
 
-    /// Renews a lease, if this worker has it; returns whether it does.
+    /// Renews a lease if this worker holds it, and returns whether it does. Not every renewal is written to the database ([`Renewals`]).
     async fn renew(
         &self,
         worker: &WorkerName,
@@ -256,7 +256,7 @@ impl RequestHandler {
         }
         // A lease that does not name a slot of this worker is renewed in the name of the worker.
         let is_own_slot = lease.holder.starts_with(&worker.slot_holder(""));
-        let claim = claim(
+        let claim = to_claim(
             lease,
             if is_own_slot {
                 &lease.holder
@@ -350,9 +350,9 @@ impl RequestHandler {
 struct LiveEventBytes(HashMap<Uuid, usize>);
 
 impl LiveEventBytes {
-    /// Far more than the events of any game.
+    /// Maximum number of bytes per lease: far more than the events of any game.
     const MAX: usize = 4 << 20;
-    /// More leases than slots; then the counts begin again.
+    /// Maximum number of leases with a count, far more than there are slots. Beyond it, all counts begin again.
     const MAX_LEASES: usize = 10_000;
 
     /// Counts a message; false if its lease has sent too much.

@@ -76,7 +76,7 @@ impl Streams {
 
     /// Sets up the stream of results and its consumer.
     pub(super) async fn results(&self) -> anyhow::Result<PullConsumer> {
-        // The owner of the stream of jobs owns the stream of results. Otherwise two new servers could create one each.
+        // The stream of jobs is created first and decides the owner of both. Otherwise two new servers could create one stream each.
         self.owned_stream(&self.jobs_config(), &self.owns_jobs_stream)
             .await?;
         let stream = self.stream(self.results_config(), &self.owns_results_stream);
@@ -101,7 +101,8 @@ impl Streams {
         let info = consumer.info().await.with_context(context)?;
         let is_idle = info.num_pending == 0 && info.num_ack_pending == 0;
         let first = (is_idle && state.messages > 0).then_some(state.first_sequence);
-        // A result that was just acknowledged looks the same, but only once.
+        // If the consumer is idle, the stream must be empty. A result that was just acknowledged may still be in it, but not at the next
+        // check.
         anyhow::ensure!(first.is_none() || first != *undelivered, MESSAGES_LOST);
         *undelivered = first;
         Ok(())

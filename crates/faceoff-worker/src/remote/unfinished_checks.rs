@@ -23,7 +23,7 @@ pub(super) enum CheckStart {
 }
 
 impl UnfinishedChecks {
-    /// With a folder for the files; it is created.
+    /// Keeps its files in this folder, which is created if necessary.
     pub(super) fn open(folder: PathBuf) -> anyhow::Result<Self> {
         fs::create_dir_all(&folder).with_context(|| format!("creating {}", folder.display()))?;
         Ok(Self { folder })

@@ -13,7 +13,7 @@ use crate::{
     evaluator::Runner,
     scratch::Scratch,
     server::JobServer,
-    service::{Intervals, SlotSetup, SlotsConfig, run_slots},
+    slot_supervisor::{Intervals, SlotSetup, SlotsConfig, run_slots},
 };
 use anyhow::Context as _;
 use faceoff_types::WorkerName;

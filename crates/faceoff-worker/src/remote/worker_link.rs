@@ -17,6 +17,7 @@ const UPDATE_TIMEOUT: Duration = Duration::from_millis(20);
 
 /// The connection, and the state shared by all slots.
 pub(super) struct WorkerLink {
+    /// The async runtime on which the threads of slots wait for NATS and HTTP.
     pub(super) runtime: Handle,
     pub(super) client: Client,
     pub(super) names: Names,

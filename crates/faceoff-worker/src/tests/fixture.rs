@@ -6,8 +6,8 @@ use crate::{
     evaluator::Evaluator,
     local::LocalServer,
     server::JobServer,
-    service::{Intervals, SlotsConfig, WorkerConfig, run_with},
     slot::Backoff,
+    slot_supervisor::{Intervals, SlotsConfig, WorkerConfig, run_with},
     slot_threads::SlotThreads,
 };
 use faceoff_airhockey::{IDEAL, TASKS};
@@ -55,7 +55,7 @@ pub(super) type PlayShard =
 pub(super) type PlayGame =
     dyn Fn(&GameSpec, &mut dyn LiveFeedSink) -> Result<(), PlatformFault> + Send + Sync;
 
-/// An evaluator that plays by a test's closures, and records the played shards and assembled parts.
+/// An evaluator that plays by a test's closures, and records which shards were played and from which recordings a dataset was assembled.
 pub(super) struct ScriptedEvaluator {
     play_shard: Box<PlayShard>,
     play_game: Box<PlayGame>,
@@ -286,7 +286,7 @@ pub(super) async fn blocking<T: Send + 'static>(call: impl FnOnce() -> T + Send 
     tokio::task::spawn_blocking(call).await.unwrap()
 }
 
-/// A store, and a clock that only the tests advance, so that no lease expires because the machine is slow.
+/// A server without HTTP: a store, and a clock that only the tests advance, so that no lease expires because the machine is slow.
 pub(super) struct Server {
     pub(super) store: Store,
     pub(super) live: LiveState,
@@ -298,7 +298,7 @@ pub(super) struct Server {
     pub(super) intervals: Intervals,
 }
 
-/// Duration of a lease, seconds. Leases are renewed after a third of it in real time, which no test takes.
+/// Duration of a lease, seconds. It is renewed after a third of it in real time, so no lease is renewed while a test runs.
 pub(super) const LEASE_S: u32 = 1800;
 
 impl Server {
@@ -355,7 +355,7 @@ impl Server {
         self.store.artifacts().put_file(key, &file).await.unwrap();
     }
 
-    /// Does the artifact exist?
+    /// Is there a stored file with this key?
     pub(super) async fn has_artifact(&self, key: &str) -> bool {
         self.store.artifacts().read(key).await.is_ok()
     }

@@ -11,7 +11,7 @@ use std::sync::{
     atomic::{AtomicU32, Ordering},
 };
 
-fn full() -> anyhow::Error {
+fn full_disk_error() -> anyhow::Error {
     StoreError::DiskFull("the queue".into()).into()
 }
 
@@ -45,10 +45,10 @@ async fn commit_waits_for_disk_space_without_running_the_job_again() {
     let evaluator = ScriptedEvaluator::new(|_, _| Ok(()));
     let failures = AtomicU32::new(0);
     let running = server.start_intercepted_slots(1, &evaluator, |local| {
-        InterceptedServer::shared(local, move |interception| match interception {
-            // Fails most calls, although the report was stored.
+        InterceptedServer::wrap(local, move |interception| match interception {
+            // Three of four calls return an error, although the report was stored.
             Interception::Committed(_) if failures.fetch_add(1, Ordering::SeqCst) % 4 < 3 => {
-                Err(full())
+                Err(full_disk_error())
             }
             _ => Ok(()),
         })
@@ -73,8 +73,10 @@ async fn release_waits_for_disk_space() {
     });
     let refusals = AtomicU32::new(0);
     let running = server.start_intercepted_slots(1, &evaluator, |local| {
-        InterceptedServer::shared(local, move |interception| match interception {
-            Interception::Releasing if refusals.fetch_add(1, Ordering::SeqCst) < 5 => Err(full()),
+        InterceptedServer::wrap(local, move |interception| match interception {
+            Interception::Releasing if refusals.fetch_add(1, Ordering::SeqCst) < 5 => {
+                Err(full_disk_error())
+            }
             _ => Ok(()),
         })
     });

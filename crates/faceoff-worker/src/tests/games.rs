@@ -211,7 +211,7 @@ async fn only_the_recording_of_the_last_result_is_kept() {
     let game = start_one_game(&server, faceoff_airhockey::competition().tournament_rules())
         .await
         .id;
-    // The recording of an attempt that was killed between upload and commit.
+    // A recording is left of an attempt whose process was killed between upload and commit.
     let killed = format!("games/{game}/killed/game.zip");
     server.put_artifact(&killed, b"PK").await;
     let evaluator = ScriptedEvaluator::with_game(|_, _| Ok(()));
@@ -303,7 +303,7 @@ async fn lost_commit_response_keeps_result_and_recording() {
     let running =
         server.start_intercepted_slots(1, &ScriptedEvaluator::with_game(|_, _| Ok(())), |local| {
             let commits = Arc::clone(&commits);
-            InterceptedServer::shared(local, move |interception| match interception {
+            InterceptedServer::wrap(local, move |interception| match interception {
                 Interception::Committed(_) => {
                     commits.fetch_add(1, Ordering::SeqCst);
                     anyhow::bail!("the connection broke")

@@ -28,7 +28,8 @@ pub(super) struct InterceptedServer {
 }
 
 impl InterceptedServer {
-    pub(super) fn shared(
+    /// Wraps `server`, and calls `intercept` at each of these calls.
+    pub(super) fn wrap(
         server: LocalServer,
         intercept: impl Fn(Interception<'_>) -> anyhow::Result<()> + Send + Sync + 'static,
     ) -> Arc<dyn JobServer> {

@@ -54,11 +54,11 @@ async fn shutdown_releases_job_before_the_slot_ends() {
     server.start_evaluation().await;
     let (hanging, mut starts) = hanging_evaluator();
     let (worker_ended, worker_end) = std::sync::mpsc::channel();
-    // Did the worker end before it had released its job?
+    // Did the worker end before it had released its job? The releasing call waits for the worker's end, in vain if all is right.
     let (ended_early, worker_end) = (Arc::new(AtomicBool::new(false)), Mutex::new(worker_end));
     let running = server.start_intercepted_slots(1, &hanging, |local| {
         let ended_early = Arc::clone(&ended_early);
-        InterceptedServer::shared(local, move |interception| {
+        InterceptedServer::wrap(local, move |interception| {
             if let Interception::Releasing = interception {
                 // Enough time for a worker that wrongly does not wait for the release.
                 let ended = worker_end
@@ -139,9 +139,9 @@ async fn result_of_a_lost_lease_is_discarded() {
     let (handle, clock) = (tokio::runtime::Handle::current(), server.clock());
     let (store, clock_ahead_s) = (server.store.clone(), Arc::clone(&server.clock_ahead_s));
     let second_claim = Arc::new(Mutex::new(None));
-    let shared_claim = Arc::clone(&second_claim);
+    let claim_of_evaluator = Arc::clone(&second_claim);
     let evaluator = ScriptedEvaluator::new(move |spec, _| {
-        if shared_claim.lock().unwrap().is_none() {
+        if claim_of_evaluator.lock().unwrap().is_none() {
             // The slot stalls until its lease has expired, and another worker claims the shard.
             clock_ahead_s.fetch_add(i64::from(LEASE_S) + 1, Ordering::SeqCst);
             let claimed = handle
@@ -158,7 +158,7 @@ async fn result_of_a_lost_lease_is_discarded() {
                 (shard.task, shard.first_episode),
                 (spec.task, spec.episodes.start)
             );
-            *shared_claim.lock().unwrap() = Some((claim, shard));
+            *claim_of_evaluator.lock().unwrap() = Some((claim, shard));
         }
         Ok(())
     });

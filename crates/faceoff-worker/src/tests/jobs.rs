@@ -26,8 +26,8 @@ async fn commit(server: &Server, job: &JobSpec, report: JobReport) -> LeaseStatu
     blocking(move || local.commit(&lease, report).unwrap()).await
 }
 
-/// The report with which a slot would complete the job, after storing the job's files.
-async fn complete(server: &Server, job: &JobSpec) -> JobReport {
+/// Stores the files of a completed job, and returns its report, as a slot would do.
+async fn store_files_and_report(server: &Server, job: &JobSpec) -> JobReport {
     match &job.payload {
         JobPayload::Validation { .. } => {
             JobReport::Validation(valid_outcome("native", "scripted", ""))
@@ -66,7 +66,7 @@ async fn complete(server: &Server, job: &JobSpec) -> JobReport {
 }
 
 async fn complete_and_commit(server: &Server, job: &JobSpec) {
-    let report = complete(server, job).await;
+    let report = store_files_and_report(server, job).await;
     assert_eq!(commit(server, job, report).await, LeaseStatus::Held);
 }
 
@@ -115,7 +115,8 @@ async fn jobs_do_not_contain_the_season_secret() {
         }
         complete_and_commit(&server, &job).await;
     }
-    // Recorded are 2 shards of each of 3 tasks; the ablation has 1 shard of each task in 6 profiles, unrecorded.
+    // The evaluation has 2 shards of each of 3 tasks, which are recorded. The ablation has 1 shard of each task in 6 profiles, which are
+    // not recorded.
     assert_eq!((validation, recorded, unrecorded, scored), (1, 6, 18, 1));
 }
 
@@ -219,7 +220,7 @@ async fn dataset_is_kept_when_its_commit_fails() {
     let server = Server::new().await;
     let id = server.start_evaluation().await;
     let job = scoring_job(&server).await;
-    let report = complete(&server, &job).await;
+    let report = store_files_and_report(&server, &job).await;
     let JobReport::Scoring { dataset, .. } = report.clone() else {
         panic!("{report:?}")
     };
@@ -255,8 +256,8 @@ async fn dataset_of_a_lost_lease_is_removed() {
     let job = scoring_job(&server).await;
     assert_eq!(job.lease.job_id, expired_job.lease.job_id);
     let (report, late_report) = (
-        complete(&server, &job).await,
-        complete(&server, &expired_job).await,
+        store_files_and_report(&server, &job).await,
+        store_files_and_report(&server, &expired_job).await,
     );
     assert_eq!(
         commit(&server, &expired_job, late_report.clone()).await,
@@ -282,7 +283,7 @@ async fn lost_commit_response_keeps_the_dataset() {
     let id = server.start_evaluation().await;
     let evaluator = ScriptedEvaluator::new(|_, _| Ok(()));
     let running = server.start_intercepted_slots(2, &evaluator, |local| {
-        InterceptedServer::shared(local, |interception| match interception {
+        InterceptedServer::wrap(local, |interception| match interception {
             Interception::Committed(JobReport::Scoring { .. }) => {
                 anyhow::bail!("the connection broke")
             }

@@ -33,7 +33,7 @@ pub(super) fn game_report(spec: &GameSpec, out: &Path) -> GameReport {
         end: GameEnd::Played,
         sides: [side(1), side(0)],
     };
-    let played_as = GameSettings {
+    let settings = GameSettings {
         ruleset: spec.ruleset,
         profile: spec.profile,
         perturbations: spec.perturbations.clone(),
@@ -46,7 +46,7 @@ pub(super) fn game_report(spec: &GameSpec, out: &Path) -> GameReport {
     let [game, first, second] = files;
     GameReport {
         archives: GameArchives {
-            score: score_game(&played_as, &outcome, &[times.clone(), times]),
+            score: score_game(&settings, &outcome, &[times.clone(), times]),
             outcome,
             game,
             sides: [first, second],

@@ -71,7 +71,7 @@ async fn slots_play_each_shard_once_and_store_the_dataset() {
 }
 
 /// The state of a submission after its validation run.
-async fn checked_state(
+async fn validated_state(
     server: &Server,
     id: SubmissionId,
     events: &mut broadcast::Receiver<Change>,
@@ -93,7 +93,7 @@ async fn idle_slot_validates_submissions() {
     let valid_id = server.upload("Alpha", VALID_ARCHIVE).await.id;
     let invalid_id = server.upload("Beta", INVALID_ARCHIVE).await.id;
     assert_eq!(
-        checked_state(&server, valid_id, &mut events).await,
+        validated_state(&server, valid_id, &mut events).await,
         SubmissionState::Valid
     );
     let log = server.store.submission_log(valid_id).await.unwrap();
@@ -101,7 +101,7 @@ async fn idle_slot_validates_submissions() {
     let reason = "agent.toml is missing".to_owned();
     let invalid = SubmissionState::Invalid { reason };
     assert_eq!(
-        checked_state(&server, invalid_id, &mut events).await,
+        validated_state(&server, invalid_id, &mut events).await,
         invalid
     );
     running.stop().await;
@@ -161,7 +161,7 @@ async fn error_after_a_cancellation_is_no_platform_fault() {
     let upload = server.upload("Beta", VALID_ARCHIVE).await;
     // The slot does not pause, as it would after a platform fault.
     assert_eq!(
-        checked_state(&server, upload.id, &mut events).await,
+        validated_state(&server, upload.id, &mut events).await,
         SubmissionState::Valid
     );
     running.stop().await;
@@ -404,9 +404,13 @@ async fn ablation_plays_own_episodes_in_all_profiles() {
         .episode_summaries(&runs, version)
         .await
         .unwrap();
-    assert_eq!(summaries.len(), runs.len(), "stored with the last shards");
+    assert_eq!(
+        summaries.len(),
+        runs.len(),
+        "the commit of a run's last shard stores its summary"
+    );
     let unsummarised = server.store.unsummarised_runs(version).await.unwrap();
-    assert_eq!(unsummarised, [], "nor does a scored evaluation lack one");
+    assert_eq!(unsummarised, [], "the scored evaluation has one, too");
     let secret = server.store.season().await.unwrap().secret;
     let specs = std::mem::take(&mut *specs.lock().unwrap());
     let ablation_specs: Vec<_> = specs
@@ -416,7 +420,7 @@ async fn ablation_plays_own_episodes_in_all_profiles() {
     // The evaluation has 6 shards; the ablation has one for each of 6 profiles and 3 tasks.
     assert_eq!((specs.len(), ablation_specs.len()), (6 + 18, 18));
     for (run, profile) in ablation_specs.chunks(3).zip(ABLATION_PROFILES) {
-        // The order of a run's shards is drawn.
+        // The order of a run's shards is random.
         for task in TASKS {
             let spec = run.iter().find(|spec| spec.task == task);
             let spec = spec.expect("each task is played");
@@ -427,8 +431,8 @@ async fn ablation_plays_own_episodes_in_all_profiles() {
             assert_eq!(spec.mismatch_seed, secret.model_mismatch());
         }
     }
-    // Clips are stored of episodes that end differently than in the ideal simulator, with their ideal counterparts. In the
-    // scripted clips these are the episodes 1.
+    // Clips are kept of episodes that end differently than in the ideal simulator, together with the same episodes in the ideal simulator.
+    // In the scripted clips this is episode 1 of each task.
     let artifacts = server.store.artifacts();
     for _ in 0..2 {
         cleanup::clean_up(&server.store, server.local().competition(), &server.clock()).await;

@@ -21,7 +21,7 @@ async fn are_over(server: &Server, tournament: TournamentId) -> bool {
 /// Runs games until the process is killed or all games are over, and prints a line for each event. Started by the test below.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 #[ignore = "the child process of tournament_survives_killed_servers"]
-async fn child() {
+async fn child_process_plays_games() {
     run_jobs(2, async |server, id| {
         are_over(server, id.parse().unwrap()).await
     })
@@ -47,8 +47,13 @@ async fn tournament_survives_killed_servers() {
 
     let id = tournament.to_string();
     for events_to_live in [1, 2, 3, 5, 8, 13, 21, 13, 8, 5, 3, 2] {
-        let seen = run_and_kill(&server, "games_killed::child", &id, events_to_live);
-        assert_eq!(seen, events_to_live, "the child ended early");
+        let seen_events = run_and_kill(
+            &server,
+            "games_killed::child_process_plays_games",
+            &id,
+            events_to_live,
+        );
+        assert_eq!(seen_events, events_to_live, "the child ended early");
     }
     let worker = server.start_worker(2);
     let results = wait_for_results(&server, tournament).await;

@@ -12,7 +12,7 @@ use jiff::Timestamp;
 /// test below.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 #[ignore = "the child process of killed_evaluation_has_the_same_result"]
-async fn child() {
+async fn child_process_runs_evaluation() {
     run_jobs(1, async |server, id| {
         let id = id.parse().unwrap();
         server.store.evaluation(id).await.unwrap().state.is_over()
@@ -45,7 +45,12 @@ async fn killed_evaluation_has_the_same_result() {
 
     let id = killed.id.to_string();
     for events_to_live in [1, 2, 3, 1, 4, 2] {
-        let seen = run_and_kill(&server, "kill::child", &id, events_to_live);
+        let seen_events = run_and_kill(
+            &server,
+            "kill::child_process_runs_evaluation",
+            &id,
+            events_to_live,
+        );
         let over = server
             .store
             .evaluation(killed.id)
@@ -53,7 +58,10 @@ async fn killed_evaluation_has_the_same_result() {
             .unwrap()
             .state
             .is_over();
-        assert!(over || seen == events_to_live, "the child ended early");
+        assert!(
+            over || seen_events == events_to_live,
+            "the child ended early"
+        );
     }
     let worker = server.start_worker(1);
     let state = server.wait_for_end(killed.id).await;
@@ -63,8 +71,8 @@ async fn killed_evaluation_has_the_same_result() {
     worker.stop().await;
 
     let undisturbed = without_times(server.store.outcomes(undisturbed.run).await.unwrap());
-    let survived = without_times(server.store.outcomes(killed.run).await.unwrap());
-    assert_eq!(survived, undisturbed);
+    let killed = without_times(server.store.outcomes(killed.run).await.unwrap());
+    assert_eq!(killed, undisturbed);
     let published = server.path().join("data/artifacts").join(dataset);
     let kept = std::fs::read_dir(published.parent().unwrap()).unwrap();
     let mut kept: Vec<_> = kept.map(|entry| entry.unwrap().path()).collect();

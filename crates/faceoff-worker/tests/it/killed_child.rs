@@ -33,8 +33,8 @@ pub async fn run_jobs(slots: usize, is_over: impl AsyncFn(&Server, &str) -> bool
     worker.stop().await;
 }
 
-/// Runs an ignored test, which calls [`run_jobs`], in a child process on the server's folder, and kills it after this number of
-/// events. Returns how many it reported.
+/// Runs an ignored test, which calls [`run_jobs`], in a child process on the server's folder, and kills the process after it has
+/// reported `events_to_live` events. Returns how many it reported, which is less if it ended before.
 pub fn run_and_kill(server: &Server, test: &str, id: &str, events_to_live: usize) -> usize {
     let mut child = Command::new(env::current_exe().unwrap())
         .args(["--exact", test, "--ignored", "--nocapture"])

@@ -1,4 +1,5 @@
-//! A server for tests: a store, a worker with slots that run jobs, and teams with the agent `agent.py`.
+//! A server for tests: a store, a worker with slots that run jobs, and teams with the agent `agent.py`. The variables of its environment
+//! (`GOOD_EPISODES`, `SWING`, `MISCHIEF`), which a test sets in the manifest, decide how the agent behaves; `agent.py` describes them.
 
 use faceoff_live::LiveState;
 use faceoff_metrics::Metrics;

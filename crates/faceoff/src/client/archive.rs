@@ -14,7 +14,7 @@ use tokio::{
     io::AsyncWriteExt,
 };
 
-/// Longest silence of the server: before the first byte it copies its database and hashes new files.
+/// Longest silence of the server. It is long, since the server copies its database and hashes new files before it sends the first byte.
 const READ_TIMEOUT: Duration = Duration::from_secs(3600);
 
 impl Client {
@@ -34,17 +34,17 @@ impl Client {
                 file.display()
             );
         }
-        let slow_client = Self {
+        let patient_client = Self {
             http: self.address.http(READ_TIMEOUT)?,
             ..self.clone()
         };
         let query = ArchiveQuery {
             edition: Some(edition),
         };
-        let request = slow_client
+        let request = patient_client
             .request(Method::GET, "/season/archive")
             .query(&query);
-        let response = slow_client.send(request).await?;
+        let response = patient_client.send(request).await?;
         let partial = with_suffix(file, ".part");
         let fetched = fetch(response, &partial).await;
         let checked = match fetched {

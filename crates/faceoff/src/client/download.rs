@@ -22,10 +22,10 @@ const HASH_HEADER: &str = "x-content-blake3";
 pub struct DownloadedFile {
     pub file: PathBuf,
     pub bytes: u64,
-    /// Bytes that an interrupted download had left.
+    /// Bytes of an earlier, interrupted download that were kept; 0 if the file was downloaded from its beginning.
     pub resumed_at: u64,
     pub blake3: String,
-    /// The hash was compared with the server's. `false`: the server sent none.
+    /// Was the hash compared with the expected one? It was not if neither the caller nor the server had named one.
     pub checked: bool,
 }
 
@@ -270,7 +270,7 @@ impl PartialFile {
 
 impl Drop for PartialFile {
     fn drop(&mut self) {
-        // A refused download leaves an empty file.
+        // A download that the server refuses has created an empty partial file.
         if self
             .file
             .metadata()

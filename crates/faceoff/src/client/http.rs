@@ -56,7 +56,8 @@ impl Address {
     }
 }
 
-/// The address of a server without what people copy along with it: the path of a page, or a missing scheme.
+/// The address of a server from a text that a user has copied: without the path of a page, brackets and quotation marks, and with a
+/// scheme if it had none.
 pub fn server_address(text: &str) -> String {
     let text = text.trim().trim_matches(['<', '>', '"', '\'']);
     let with_scheme = if text.contains("://") {

@@ -345,7 +345,7 @@ async fn request_is_retried_while_its_failures_are_temporary() {
     };
     let retry_timeout = Duration::from_mins(5);
     let requests = AtomicU32::new(0);
-    // A restart: the server is gone, then not ready, then there.
+    // A restart: the server does not answer, then it and its proxy refuse, then it answers.
     let answer = retry_temporary(retry_timeout, async || {
         match requests.fetch_add(1, Ordering::Relaxed) {
             0 | 1 => Err(Unreachable("gone".to_owned()).into()),
@@ -357,10 +357,12 @@ async fn request_is_retried_while_its_failures_are_temporary() {
     assert_eq!(answer.await.unwrap(), "there");
     assert_eq!(requests.load(Ordering::Relaxed), 5);
     let started = Instant::now();
-    let gone = async || -> anyhow::Result<()> { Err(Unreachable("gone".to_owned()).into()) };
-    let given_up = retry_temporary(retry_timeout, gone).await.unwrap_err();
-    assert!(given_up.is::<Unreachable>() && started.elapsed() >= retry_timeout);
-    // A refusal stays one.
+    let unreachable = async || -> anyhow::Result<()> { Err(Unreachable("gone".to_owned()).into()) };
+    let last_error = retry_temporary(retry_timeout, unreachable)
+        .await
+        .unwrap_err();
+    assert!(last_error.is::<Unreachable>() && started.elapsed() >= retry_timeout);
+    // A refusal that is not temporary is not retried.
     let started = Instant::now();
     let forbidden = async || -> anyhow::Result<()> { Err(refused(StatusCode::FORBIDDEN).into()) };
     let final_error = retry_temporary(retry_timeout, forbidden).await.unwrap_err();

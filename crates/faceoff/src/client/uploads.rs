@@ -33,16 +33,16 @@ const RETRY_TIMEOUT: Duration = Duration::from_mins(5);
 /// Longest time without a byte sent or an answer received; then the connection is given up.
 const STALL_TIMEOUT: Duration = Duration::from_secs(60);
 
-/// A slow link sends at least one chunk in [`STALL_TIMEOUT`].
+/// Size of the pieces of a part. It is so small that even a slow link sends one within [`STALL_TIMEOUT`].
 const CHUNK_BYTES: usize = 16 << 10;
 
-/// Longest duration of a part. The HTTP client counts the time in which it sends as silence of the server.
+/// Longest duration of a part. It is the HTTP client's read timeout, which also runs while the client sends.
 const UPLOAD_TIMEOUT: Duration = Duration::from_hours(24);
 
 /// An upload of a bundle in parts. One part suffices unless its connection breaks.
 struct PartialUpload<'a> {
     client: &'a Client,
-    /// A client that also waits while it sends.
+    /// An HTTP client with [`UPLOAD_TIMEOUT`].
     http: reqwest::Client,
     bundle: &'a BundleFile,
     /// Path of the partial upload on the server.
@@ -53,10 +53,13 @@ struct PartialUpload<'a> {
 impl PartialUpload<'_> {
     /// Sends what the server does not have yet.
     async fn send(&self) -> anyhow::Result<()> {
-        let mut farthest = 0;
+        let mut most_received_bytes = 0;
         let mut give_up_at = Instant::now() + RETRY_TIMEOUT;
         loop {
-            let error = match self.send_rest(&mut farthest, &mut give_up_at).await {
+            let error = match self
+                .send_rest(&mut most_received_bytes, &mut give_up_at)
+                .await
+            {
                 Ok(()) => return Ok(()),
                 Err(error) => error,
             };
@@ -70,14 +73,18 @@ impl PartialUpload<'_> {
 
     /// Sends one part, from the first byte that the server does not have to the end. If the server has received more since
     /// the last attempt, the time for retries starts again.
-    async fn send_rest(&self, farthest: &mut u64, give_up_at: &mut Instant) -> anyhow::Result<()> {
+    async fn send_rest(
+        &self,
+        most_received_bytes: &mut u64,
+        give_up_at: &mut Instant,
+    ) -> anyhow::Result<()> {
         let offset = match self.client.get::<PartialUploadView>(&self.path).await {
             Ok(upload) => upload.received_bytes,
             Err(error) if is_refused_with(&error, StatusCode::NOT_FOUND) => 0,
             Err(error) => return Err(error),
         };
-        if offset > *farthest {
-            *farthest = offset;
+        if offset > *most_received_bytes {
+            *most_received_bytes = offset;
             *give_up_at = Instant::now() + RETRY_TIMEOUT;
         }
         self.progress.set_position(offset);
@@ -127,17 +134,17 @@ fn is_conflict(error: &anyhow::Error) -> bool {
 
 /// Whether an upload may go on after this failure: not if a quota is used up or the server's disk is full, which may last.
 fn is_interruption(error: &anyhow::Error) -> bool {
-    let lasts = [
+    let lasting_refusals = [
         StatusCode::TOO_MANY_REQUESTS,
         StatusCode::INSUFFICIENT_STORAGE,
     ];
     is_temporary(error)
-        && !lasts
+        && !lasting_refusals
             .into_iter()
             .any(|status| is_refused_with(error, status))
 }
 
-/// Waits until no chunk has been sent for the longest time that is allowed.
+/// Waits until no chunk has been sent for [`STALL_TIMEOUT`].
 async fn stalled(newest_chunk: &Mutex<Instant>) {
     loop {
         let newest = *newest_chunk.lock().unwrap_or_else(PoisonError::into_inner);
@@ -207,7 +214,7 @@ impl Client {
             // The server's file is damaged, for example by a power failure.
             Err(error) if is_conflict(&error) => {
                 let removed = self.send(self.request(Method::DELETE, &parts.path)).await;
-                // Without parts, the conflict has another reason.
+                // If the server has no parts to remove, the conflict has another reason.
                 removed.map_err(|_| error)?;
                 submit().await
             }

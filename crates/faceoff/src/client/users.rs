@@ -40,14 +40,16 @@ impl Client {
         self.post_empty(&format!("/tokens/{id}/rotate")).await
     }
 
-    /// Revokes a token. `made` says whether the tokens, invitations and webhooks that were created with it end, too.
+    /// Revokes a token. `created_with_it` says whether the tokens, invitations and webhooks that were created with the token end, too.
     pub async fn revoke_token(
         &self,
         id: TokenId,
-        made: Option<CreatedCredentials>,
+        created_with_it: Option<CreatedCredentials>,
     ) -> anyhow::Result<RevokedTokenView> {
         let request = self.request(Method::DELETE, &format!("/tokens/{id}"));
-        let request = request.query(&RevocationQuery { made });
+        let request = request.query(&RevocationQuery {
+            made: created_with_it,
+        });
         read_json(self.send(request).await?).await
     }
 
@@ -82,7 +84,7 @@ impl Client {
             .await
     }
 
-    /// Registers a team; only this response has its link.
+    /// Registers a team. Only this response has its registration link, which shows the organisers' decision.
     pub async fn register(&self, new: &RegistrationRequest) -> anyhow::Result<NewRegistrationView> {
         let mut created: NewRegistrationView = self.post("/registrations", new).await?;
         self.make_absolute(&mut created.join_link);

@@ -33,7 +33,7 @@ impl Client {
         self.post_empty(&format!("/webhooks/{id}/rotate")).await
     }
 
-    /// Sends a test delivery.
+    /// Makes the server send a test delivery to the webhook's address, and returns its outcome.
     pub async fn test_webhook(&self, id: WebhookId) -> anyhow::Result<DeliveryView> {
         self.post_empty(&format!("/webhooks/{id}/test")).await
     }

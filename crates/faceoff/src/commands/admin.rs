@@ -3,9 +3,9 @@
 mod announcements;
 mod authentication;
 mod day;
+mod evaluation_lines;
 mod evaluations;
 mod export;
-mod lines;
 mod log;
 mod people;
 mod proposal;

@@ -13,11 +13,11 @@ use std::{
 pub struct FolderOperation {
     /// The operation, for messages and for the name of the lock file.
     pub name: &'static str,
-    /// Suffix of the temporary folder.
+    /// Suffix of the temporary folder: it is beside the target, and its name is the target's with a dot and this suffix.
     pub suffix: &'static str,
 }
 
-/// Refuses a folder that is not empty; `reason` completes the message.
+/// Refuses a folder that is not empty. `reason`, which says why the folder must be empty, completes the message.
 ///
 /// # Errors
 /// If the folder is not empty, or cannot be read.

@@ -116,7 +116,7 @@ impl CompareCommand {
     }
 
     async fn compare_on_server(&self, server: &str) -> anyhow::Result<()> {
-        // With a login, results that are not public yet can be compared, too.
+        // The token of a login also allows comparisons of results that are not public yet.
         let client = Connection::resolve(Some(server), None, self.ca.path())?.client()?;
         let a = find_evaluation(&client, &self.a).await?;
         let b = find_evaluation(&client, &self.b).await?;

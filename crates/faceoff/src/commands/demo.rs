@@ -61,7 +61,7 @@ pub struct DemoCommand {
 /// Output of `--json`.
 #[derive(Debug, Serialize)]
 struct DemoView<'a> {
-    /// URL of the board, which is not served with `--no-serve`.
+    /// URL of the server, whose start page is the board. With `--no-serve` the server has ended.
     server: &'a str,
     data_dir: &'a Path,
     board: &'a BoardView,
@@ -94,7 +94,7 @@ impl DemoCommand {
     }
 
     async fn run_day(self) -> anyhow::Result<()> {
-        // Checked before anything is removed: on another server's port, the demo would talk to that server.
+        // Checked before anything is removed. If another server had this port, the demo would send its requests to that server.
         TcpListener::bind(self.listen).with_context(|| {
             format!(
                 "{} is in use; choose another with --listen 127.0.0.1:PORT (with make demo: LISTEN=127.0.0.1:PORT)",
@@ -167,10 +167,10 @@ impl DemoCommand {
             .context("the first team has no evaluation")?;
         let dataset = self.data_dir.join(format!("{name}-dataset.zip"));
         let hidden_bar = ProgressBar::hidden();
-        let done = client
+        let downloaded = client
             .download_dataset(first_evaluation.id, &dataset, None, &hidden_bar)
             .await?;
-        let bytes = done.bytes;
+        let bytes = downloaded.bytes;
         ensure!(bytes > 0, "the dataset of {name} is empty");
         progress.step(format_args!(
             "5. dataset of {name}: {} ({:.1} MB)",
@@ -190,7 +190,7 @@ impl DemoCommand {
                 server: &server.url,
                 data_dir: &self.data_dir,
                 board: &board,
-                dataset: &done,
+                dataset: &downloaded,
             };
             print_json(&view)?;
         }
@@ -253,7 +253,7 @@ fn team_name(bundle: &Path) -> anyhow::Result<String> {
     Ok(name.split('.').next().unwrap_or_default().to_owned())
 }
 
-/// The server as a separate process, as an organiser would run it.
+/// The server as a process of its own, as an organiser would run it.
 struct Server {
     child: Child,
     /// Empty until [`wait_until_ready`](Self::wait_until_ready) returns.
@@ -414,7 +414,7 @@ async fn wait_for_evaluations(
         }
         tokio::time::sleep(POLL_INTERVAL).await;
     }
-    // The end of the last evaluation has released the day.
+    // A day is released with its last evaluation.
     ensure!(
         ended
             .iter()

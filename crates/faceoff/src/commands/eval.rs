@@ -160,7 +160,7 @@ impl EvalCommand {
             if server_stage.is_none() {
                 local_bundle::check_runtime(&config, runtime)?;
             } else {
-                // The server's stage decides which runtimes there are.
+                // Whether the stage allows the runtime is checked below.
                 config.check_runtime(runtime)?;
             }
         }
@@ -249,7 +249,7 @@ impl EvalCommand {
         Ok(())
     }
 
-    /// Layers of the sandbox that are not used on this machine.
+    /// Layers (protections) of the sandbox that are not used on this machine.
     fn given_up(&self, config: &Config) -> Vec<String> {
         if self.no_sandbox {
             return vec!["the sandbox (--no-sandbox)".to_owned()];
@@ -269,7 +269,7 @@ impl EvalCommand {
         // The process may be restricted to some of the machine's CPUs.
         let cpus = affinity::allowed_cpus().context("reading the CPU affinity of this process")?;
         let layout = CpuLayout::divide(&cpus, workers, 1);
-        if layout.shared && workers > 1 {
+        if layout.agents_share_cpus && workers > 1 {
             self.notes().print(format_args!(
                 "note: {workers} workers share {} CPUs; results do not change, but computation \
                 times may be longer",

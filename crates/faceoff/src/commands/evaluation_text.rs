@@ -59,7 +59,7 @@ pub(super) fn task_table(tasks: &TaskMap<TaskView>) -> String {
         "{:<8} {:>8} {:>9} {:>19} {:>8}{tier_heading}",
         "task", "episodes", "success", "95 % interval", "penalty"
     )];
-    // The order in JSON has no meaning.
+    // JSON objects have no order, so the tasks are sorted as on boards.
     let tasks = competition()
         .task_names()
         .filter_map(|task| Some((task, tasks.get(&task)?)));

@@ -108,7 +108,7 @@ pub fn import(archive: &Path, data: &Path, now: Timestamp) -> anyhow::Result<Man
     }
     let (from, to) = (unpacked.join(ARTIFACTS), folder.join(ARTIFACTS));
     match fs::rename(&from, &to) {
-        // The season has no datasets.
+        // An archive without this folder is of a season without artifacts.
         Err(error) if error.kind() == ErrorKind::NotFound => create_private(&to)?,
         result => result.with_context(|| format!("naming {}", to.display()))?,
     }

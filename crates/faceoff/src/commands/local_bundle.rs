@@ -147,7 +147,7 @@ pub(super) fn check_runtime(config: &Config, runtime: &str) -> anyhow::Result<()
     );
 }
 
-/// Where `python3-ml` is looked for: in the user's data folder, then in the one of the documentation.
+/// The folders in which `python3-ml` is looked for: below the user's data folder, then the folder that the documentation names.
 fn default_folders() -> Vec<PathBuf> {
     let data = std::env::var_os("XDG_DATA_HOME").map(PathBuf::from);
     let data = data.filter(|folder| folder.is_absolute()).or_else(|| {

@@ -1,4 +1,5 @@
-//! Users and invitations: their text, and the commands of organisers and members about invitations. An invited *founder* creates a new team; a *return* restores a user's account.
+//! Users and invitations: their text, and the commands of organisers and members about invitations. An invited *founder* creates a new
+//! team; a *return* restores a user's account.
 
 use super::output::{print, print_list, time_text};
 use crate::client::Client;

@@ -47,7 +47,7 @@ impl Machine {
     }
 }
 
-/// The right time, so many milliseconds after the start.
+/// The time so many milliseconds after the start, by a clock that is never set.
 fn at(ms: i64) -> Timestamp {
     let start: Timestamp = START.parse().unwrap();
     start + SignedDuration::from_millis(ms)
@@ -57,7 +57,7 @@ fn at(ms: i64) -> Timestamp {
 fn clock_without_steps_is_the_system_clock() {
     let machine = Machine::default();
     let clock = machine.clock(ClockStart::default());
-    // The machine may be suspended: the monotonic clock goes on.
+    // 90 days without a reading, as of a suspended machine: its monotonic clock goes on, too.
     for ms in [0, 1, 1000, 90 * DAY_MS] {
         machine.pass(ms);
         let now = at(machine.monotonic_ms.load(Ordering::SeqCst));
@@ -113,7 +113,7 @@ fn small_corrections_are_followed_but_not_their_sum() {
         machine.set(1728);
         assert_eq!(clock.step(), None);
     }
-    // Someone who sets it in small steps gets no further than with a large one.
+    // 100 steps of 1 s within 100 s move the clock by no more than the tolerated 3 s in all, beside the 100 s that pass.
     let before = clock.now();
     for _ in 0..100 {
         machine.pass(1000);
@@ -190,7 +190,7 @@ fn clock_before_the_newest_change_is_reported() {
         StepCause::MonotonicClock,
         "the monotonic clock explains it better"
     );
-    // A file system or a clock may be a little off.
+    // A change that is one second ahead of the clock is within the tolerance.
     let nearly = ClockStart {
         newest_change_at: Some(at(1000)),
         ..start

@@ -138,7 +138,7 @@ async fn foreign_partial_file_is_not_resumed() {
             .resumed_at,
         0
     );
-    // The partial file is complete and only needs its name.
+    // The partial file is complete: no byte is left to request, so the file is downloaded again.
     write_partial_file(&bytes, Some(&tag));
     assert_eq!(download(&client, &uploaded, &file).await.unwrap(), whole);
     // Damage is detected, and the partial file is deleted.

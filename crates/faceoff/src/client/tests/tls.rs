@@ -69,7 +69,7 @@ async fn refusal(client: &Client) -> String {
 }
 
 #[tokio::test]
-async fn server_of_a_named_authority_is_trusted() {
+async fn server_certified_by_the_given_authority_is_trusted() {
     let site = start_site(BUNDLE_BYTES).await;
     let authority = authority("ours");
     let address = start_tls_proxy(&site, &authority, "localhost").await;
@@ -93,7 +93,7 @@ async fn server_of_a_named_authority_is_trusted() {
 }
 
 #[tokio::test]
-async fn self_signed_certificate_is_trusted_if_named() {
+async fn self_signed_certificate_is_trusted_if_given() {
     let site = start_site(SMALL_BUNDLE_BYTES).await;
     let key = KeyPair::generate().unwrap();
     let params = CertificateParams::new(["localhost".to_owned()]).unwrap();
@@ -123,20 +123,20 @@ async fn untrusted_tls_server_gets_no_token() {
         assert!(refused.contains(words), "{refused}");
     }
 
-    // Another authority with the trusted one's name.
+    // An authority with the name of the trusted one, but with another key.
     let impostor = start_tls_proxy(&site, &authority("trusted"), "localhost").await;
     let url = format!("https://localhost:{}", impostor.port());
     let refused = refusal(&Client::new(&url, Some(ADMIN), Some(&ca_file)).unwrap()).await;
     assert!(refused.contains("unknown authority"), "{refused}");
 
-    let another = start_tls_proxy(&site, &trusted, "faceoff.example.org").await;
-    let url = format!("https://localhost:{}", another.port());
+    let other_host = start_tls_proxy(&site, &trusted, "faceoff.example.org").await;
+    let url = format!("https://localhost:{}", other_host.port());
     let refused = refusal(&Client::new(&url, Some(ADMIN), Some(&ca_file)).unwrap()).await;
     assert!(refused.contains("another host"), "{refused}");
 
-    // The same server without TLS.
-    let plain = site.url.replace("http://", "https://");
-    let refused = refusal(&Client::new(&plain, Some(ADMIN), Some(&ca_file)).unwrap()).await;
+    // A server without TLS, at an address that begins with https.
+    let without_tls = site.url.replace("http://", "https://");
+    let refused = refusal(&Client::new(&without_tls, Some(ADMIN), Some(&ca_file)).unwrap()).await;
     assert!(refused.contains("begins with http://"), "{refused}");
 }
 

@@ -67,7 +67,7 @@ fn configured_server(mut listen: SocketAddr) -> String {
     format!("http://{listen}")
 }
 
-/// The server is on this machine.
+/// Is the server on this machine?
 fn is_local(server: &str) -> bool {
     let host = reqwest::Url::parse(&server_address(server))
         .ok()

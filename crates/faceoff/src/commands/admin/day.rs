@@ -2,7 +2,7 @@
 //! evaluations of one cutoff. `extra-turn` adds one evaluation.
 
 use super::{
-    lines::{evaluation_line, evaluation_lines},
+    evaluation_lines::{evaluation_line, evaluation_lines},
     team_lookup::find_team,
 };
 use crate::{
@@ -90,9 +90,9 @@ pub(super) async fn run_action(
         }
         DayAction::Unfreeze { stage } => {
             let stage = find_stage(client, &stage).await?;
-            let live = client.unfreeze(stage.id).await?;
-            print(json, &live, |live| {
-                format!("the boards of {} are live again", live.name)
+            let unfrozen = client.unfreeze(stage.id).await?;
+            print(json, &unfrozen, |unfrozen| {
+                format!("the boards of {} are live again", unfrozen.name)
             })
         }
         DayAction::MissedDay { day, reason, stage } => {

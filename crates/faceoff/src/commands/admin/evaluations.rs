@@ -1,6 +1,6 @@
 //! `faceoff admin rerun`, `cancel`, `void`, `void-day` and `evaluations`: decisions about evaluations, and their list.
 
-use super::lines::{evaluation_line, evaluation_lines};
+use super::evaluation_lines::{evaluation_line, evaluation_lines};
 use crate::{
     client::Client,
     commands::{
@@ -33,7 +33,7 @@ pub(super) enum EvaluationAction {
         evaluation: EvaluationId,
         /// Shown publicly
         reason: String,
-        /// The team's name
+        /// The team's name, as confirmation
         #[arg(long, value_name = "TEAM")]
         confirm: Option<String>,
     },

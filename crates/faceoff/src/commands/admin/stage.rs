@@ -57,7 +57,7 @@ pub(super) enum StageAction {
         #[arg(long, value_name = "NAME")]
         confirm: Option<String>,
     },
-    /// Start the final evaluation day of a closed stage with --standings final; possible once
+    /// Start the final evaluation day of a closed stage that was configured with --standings final; possible once
     Final {
         /// The stage's name or id
         stage: String,
@@ -72,7 +72,8 @@ pub(super) enum StageAction {
     },
 }
 
-// The API's crate, which has this option, does not know the competition.
+// The options `--profile` and `--perturbations` come from the API's crate, which does not know the competition. So their parsers, which
+// check the values, are set here.
 #[derive(Debug, Args)]
 #[command(
     mut_arg("profile", |option| option.value_parser(parse_profile)),
@@ -96,7 +97,7 @@ pub(super) struct StageOptions {
 }
 
 impl StageOptions {
-    /// The settings, with times that are local in the option `--zone`, or else in `zone`.
+    /// The settings. Times without an offset are local in the zone of the option `--zone`, or else in `zone`.
     fn settings(self, zone: &IanaTimeZone) -> anyhow::Result<StagePatch> {
         let zone = self.settings.zone.as_ref().unwrap_or(zone);
         let parse = |text: Option<String>| {
@@ -207,8 +208,8 @@ pub(super) async fn run_action(
 async fn default_zone(client: &Client) -> anyhow::Result<IanaTimeZone> {
     let stages = client.stages().await?;
     let open = stages.iter().rfind(|stage| stage.phase == PhaseView::Open);
-    let template = open.or(stages.last());
-    Ok(template.map_or(IanaTimeZone::UTC, |stage| stage.zone.clone()))
+    let open_or_last = open.or(stages.last());
+    Ok(open_or_last.map_or(IanaTimeZone::UTC, |stage| stage.zone.clone()))
 }
 
 /// Warnings about evaluation days that do not fit into their time.

@@ -21,7 +21,8 @@ pub struct CopiedFile {
     pub blake3: String,
 }
 
-/// Opens a file for reading. Anything else, which a backup does not contain, is refused: a pipe would be waited for without end.
+/// Opens a regular file for reading. Anything else is refused, since no backup contains it: reading a pipe, for example, could wait
+/// without end.
 ///
 /// # Errors
 /// If it is no regular file, or cannot be read.
@@ -125,7 +126,7 @@ pub fn hash_file(path: &Path) -> anyhow::Result<CopiedFile> {
 }
 
 /// Copies a folder recursively and records its files as `name/…` in `copied`. Files that are deleted meanwhile or
-/// only half written are left out; the older copy of the database decides whether they are missing.
+/// only half written are left out. Whether a file is missing is decided by the copy of the database, which was made before.
 ///
 /// # Errors
 /// If something cannot be read or written.

@@ -56,7 +56,7 @@ pub(super) fn board_text(board: &BoardView) -> String {
     text.trim_end().to_owned()
 }
 
-/// The ranked rows; tiers without teams are left out, and so are all headings in a competition without tiers.
+/// The ranked rows below headings of their tiers. Tiers without teams are left out; in a competition without tiers, there are no headings.
 pub fn board_table(board: &BoardView) -> String {
     let tasks: Vec<Task> = competition().task_names().collect();
     let mut text = line(

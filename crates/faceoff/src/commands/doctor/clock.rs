@@ -8,7 +8,7 @@ use std::{
     process::{Command, Stdio},
 };
 
-/// How far a file's time may be ahead of the clock, because file systems round.
+/// How far a file's time may be ahead of the clock, since file systems round times.
 const FILE_TIME_TOLERANCE: SignedDuration = SignedDuration::from_secs(5);
 
 /// Checks whether the clock is synchronised and not behind the last change of the database.

@@ -49,7 +49,7 @@ impl Findings {
         writeln!(out, "CPUs")?;
         let bound = match cpus.agent_cpus.as_slice() {
             [] if cpus.usable >= 2 * cpus.slots => "separate CPUs for each slot".to_owned(),
-            [] => "all CPUs of the service".to_owned(),
+            [] => "all CPUs of the server".to_owned(),
             list => format!("CPUs {list:?}"),
         };
         writeln!(

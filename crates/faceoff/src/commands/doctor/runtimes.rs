@@ -14,7 +14,7 @@ pub(super) struct RuntimeReport {
     pub name: String,
     pub available: bool,
     pub found: String,
-    /// Where links of the runtime lead to files that agents do not see.
+    /// One sentence for each folder, outside of the runtime and hidden from agents, to which links of the runtime lead.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub hidden_targets: Vec<String>,
     #[serde(rename = "cure")]
@@ -57,7 +57,7 @@ pub(super) fn runtime_reports(config: &Config, missing_layers: Vec<Layer>) -> Ve
     found
 }
 
-/// The folders with most links, one sentence each.
+/// The folders outside of the runtime to which most of its links lead, one sentence each.
 fn hidden_targets(runtime: &Runtime) -> Vec<String> {
     const MOST: usize = 5;
     let found = runtime.hidden_targets();

@@ -11,7 +11,7 @@ use faceoff_worker::check_connection;
 /// The oldest recommended version of nats-server, as major and minor number. Debian's older version works, too.
 const RECOMMENDED_NATS: (u32, u32) = (2, 12);
 
-/// Connects to NATS and asks the server; empty if no NATS server is configured.
+/// Connects to NATS and asks the server whether a worker of this name on this host would get jobs. Empty if no NATS server is configured.
 pub(super) fn check(config: &Config, name: Option<String>) -> anyhow::Result<Vec<Check>> {
     let Some(nats) = config.nats.connection() else {
         return Ok(Vec::new());

@@ -1,4 +1,4 @@
-//! Differences between this machine and a server that an agent may notice.
+//! Differences between this machine (“locally”) and a server that an agent may notice.
 
 use faceoff_types::{AgentMachine, PythonInventory, RuntimeContent, RuntimeInventory};
 
@@ -6,14 +6,14 @@ use faceoff_types::{AgentMachine, PythonInventory, RuntimeContent, RuntimeInvent
 const MAX_NAMED_PACKAGES: usize = 6;
 
 /// Compares a runtime of this machine with the server's; one sentence per difference.
-pub(super) fn compare_runtimes(local: &RuntimeInventory, remote: &RuntimeInventory) -> Vec<String> {
-    let name = &remote.name;
-    match (&local.content, &remote.content) {
-        (RuntimeContent::Python(local), RuntimeContent::Python(remote)) => {
-            compare_pythons(name, local, remote)
+pub(super) fn compare_runtimes(local: &RuntimeInventory, server: &RuntimeInventory) -> Vec<String> {
+    let name = &server.name;
+    match (&local.content, &server.content) {
+        (RuntimeContent::Python(local), RuntimeContent::Python(server)) => {
+            compare_pythons(name, local, server)
         }
-        (RuntimeContent::Native { libc: local }, RuntimeContent::Native { libc: remote }) => {
-            compare_c_libraries(local.as_deref(), remote.as_deref())
+        (RuntimeContent::Native { libc: local }, RuntimeContent::Native { libc: server }) => {
+            compare_c_libraries(local.as_deref(), server.as_deref())
                 .into_iter()
                 .collect()
         }
@@ -38,12 +38,12 @@ pub(super) fn compare_runtimes(local: &RuntimeInventory, remote: &RuntimeInvento
     }
 }
 
-fn compare_pythons(name: &str, local: &PythonInventory, remote: &PythonInventory) -> Vec<String> {
+fn compare_pythons(name: &str, local: &PythonInventory, server: &PythonInventory) -> Vec<String> {
     let mut found = Vec::new();
     let interpreter =
         |python: &PythonInventory| format!("{} {}", python.implementation, python.version);
-    if interpreter(local) != interpreter(remote) {
-        let effect = if local.minor_version() == remote.minor_version() {
+    if interpreter(local) != interpreter(server) {
+        let effect = if local.minor_version() == server.minor_version() {
             ""
         } else {
             ", so compiled packages differ"
@@ -51,12 +51,12 @@ fn compare_pythons(name: &str, local: &PythonInventory, remote: &PythonInventory
         found.push(format!(
             "{name} is {} locally and {} on the server{effect}",
             interpreter(local),
-            interpreter(remote)
+            interpreter(server)
         ));
     }
     found.extend(compare_c_libraries(
         local.libc.as_deref(),
-        remote.libc.as_deref(),
+        server.libc.as_deref(),
     ));
     let only_in = |one: &PythonInventory, other: &PythonInventory| -> Vec<String> {
         let packages = one.packages.iter();
@@ -66,15 +66,15 @@ fn compare_pythons(name: &str, local: &PythonInventory, remote: &PythonInventory
             .collect()
     };
     let other_versions = local.packages.iter().filter_map(|(name, version)| {
-        let remote = remote
+        let server = server
             .packages
             .get(name)
-            .filter(|remote| *remote != version)?;
-        Some(format!("{name} {version} (server: {remote})"))
+            .filter(|server| *server != version)?;
+        Some(format!("{name} {version} (server: {server})"))
     });
     for (heading, packages) in [
-        ("packages missing locally", only_in(remote, local)),
-        ("packages missing on the server", only_in(local, remote)),
+        ("packages missing locally", only_in(server, local)),
+        ("packages missing on the server", only_in(local, server)),
         (
             "packages with other versions locally",
             other_versions.collect(),
@@ -87,23 +87,23 @@ fn compare_pythons(name: &str, local: &PythonInventory, remote: &PythonInventory
     found
 }
 
-fn compare_c_libraries(local: Option<&str>, remote: Option<&str>) -> Option<String> {
-    let (local, remote) = (local?, remote?);
-    (local != remote).then(|| {
+fn compare_c_libraries(local: Option<&str>, server: Option<&str>) -> Option<String> {
+    let (local, server) = (local?, server?);
+    (local != server).then(|| {
         format!(
-            "the C library is {local} locally and {remote} on the server: a program built locally may need a newer version \
+            "the C library is {local} locally and {server} on the server: a program built locally may need a newer version \
             than the server's"
         )
     })
 }
 
 /// Compares this machine with the server's; one sentence per difference.
-pub(super) fn compare_machines(local: &AgentMachine, remote: &AgentMachine) -> Vec<String> {
+pub(super) fn compare_machines(local: &AgentMachine, server: &AgentMachine) -> Vec<String> {
     let mut found = Vec::new();
-    if local.architecture != remote.architecture {
+    if local.architecture != server.architecture {
         found.push(format!(
             "the architecture is {} locally and {} on the server: compiled programs do not run on both",
-            local.architecture, remote.architecture
+            local.architecture, server.architecture
         ));
     }
     let model = |machine: &AgentMachine| {
@@ -112,17 +112,17 @@ pub(super) fn compare_machines(local: &AgentMachine, remote: &AgentMachine) -> V
             .clone()
             .unwrap_or_else(|| "unknown".into())
     };
-    if local.cpu_model != remote.cpu_model {
+    if local.cpu_model != server.cpu_model {
         found.push(format!(
             "the CPU is {} locally and {} on the server: computation times differ",
             model(local),
-            model(remote)
+            model(server)
         ));
     }
-    if local.cpus_per_agent != remote.cpus_per_agent {
+    if local.cpus_per_agent != server.cpus_per_agent {
         found.push(format!(
             "an agent may use {} CPUs locally and {} on the server",
-            local.cpus_per_agent, remote.cpus_per_agent
+            local.cpus_per_agent, server.cpus_per_agent
         ));
     }
     found
@@ -168,8 +168,8 @@ mod tests {
     #[test]
     fn interpreter_and_package_versions_are_compared() {
         let local = python("3.12.1", &[("numpy", "2.0"), ("torch", "2.9")]);
-        let remote = python("3.11.2", &[("numpy", "2.4.6"), ("scipy", "1.17.1")]);
-        let found = compare_runtimes(&local, &remote);
+        let server = python("3.11.2", &[("numpy", "2.4.6"), ("scipy", "1.17.1")]);
+        let found = compare_runtimes(&local, &server);
         assert_eq!(
             found,
             [

@@ -10,7 +10,7 @@ pub(super) const LOG: &str = "agent.log";
 /// The comparison of all profiles.
 pub(super) const ABLATION: &str = "ablation.json";
 
-/// Removes the files of an earlier run, so that they are not mistaken for results of this one.
+/// Removes the files of an earlier run, so that they are not mistaken for results of this run.
 pub(super) fn remove_earlier(out: &Path) -> anyhow::Result<()> {
     for path in [RESULTS, ARCHIVE_FILE, LOG, ABLATION].map(|name| out.join(name)) {
         allow_missing(fs::remove_file(&path))

@@ -28,7 +28,7 @@ impl Logs {
         for log in &self.0 {
             let mut lines = Vec::new();
             for line in log.lines() {
-                // The line may continue with the time that the fault took.
+                // In the log, the fault may be followed by the time that passed until it.
                 if line.starts_with(&expected) {
                     return lines;
                 }

@@ -53,12 +53,13 @@ struct Pool {
     logs: Mutex<Logs>,
     fault_count: AtomicU32,
     max_faults: u32,
+    /// Ends all shards: there are too many faults, or the agent never answered, or a platform fault has occurred.
     stop: AtomicBool,
-    /// The agent has answered something.
+    /// Has any process of the agent answered?
     has_answered: AtomicBool,
     /// Ends the wait for the first answer.
     first_answer: mpsc::Sender<()>,
-    /// The run was stopped because the agent had answered nothing.
+    /// Was the run stopped because the agent had answered nothing?
     was_silent: AtomicBool,
     /// The kinds of the faults that were printed.
     printed: Mutex<Vec<AgentFaultKind>>,
@@ -139,8 +140,8 @@ pub(super) fn run_shards(
         }
     }
     let mut faults = into_inner(pool.faults);
-    let order = |task: Task| tasks.iter().position(|other| *other == task);
-    faults.sort_by_key(|fault| (order(fault.agent_task.name()), fault.episode));
+    let task_position = |task: Task| tasks.iter().position(|other| *other == task);
+    faults.sort_by_key(|fault| (task_position(fault.agent_task.name()), fault.episode));
     let logs = into_inner(pool.logs);
     if pool.was_silent.load(Ordering::Relaxed)
         && let Some(position) = faults
@@ -154,7 +155,7 @@ pub(super) fn run_shards(
         Ok(EvalOutcome::Failed { faults, logs })
     } else {
         let mut outcomes = into_inner(pool.outcomes);
-        outcomes.sort_by_key(|outcome| (order(outcome.task), outcome.episode));
+        outcomes.sort_by_key(|outcome| (task_position(outcome.task), outcome.episode));
         Ok(EvalOutcome::Finished {
             faults,
             outcomes,
@@ -221,7 +222,7 @@ impl Observer for PoolObserver<'_> {
         if let Some(fault) = &outcome.fault {
             self.0.print_fault(fault);
             lock(&self.0.faults).push(fault.clone());
-            // Every other start would be as silent.
+            // The other starts would end in the same way, so the run stops.
             if is_silent_start(&fault.fault) && !self.0.has_answered.load(Ordering::Relaxed) {
                 self.0.was_silent.store(true, Ordering::Relaxed);
                 self.0.stop.store(true, Ordering::Relaxed);

@@ -111,7 +111,7 @@ pub(super) fn run_profile(
         simulator().as_ref(),
     )
     .context("joining the recordings")?;
-    // The dataset contains them now, and further profiles need the disk space.
+    // The dataset contains the recordings now, and the runs of further profiles need the disk space.
     for dir in &dirs {
         fs::remove_dir_all(dir).with_context(|| format!("removing {}", dir.display()))?;
     }

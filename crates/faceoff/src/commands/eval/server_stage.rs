@@ -1,4 +1,4 @@
-//! `--like-server`: rules, limits and runtimes of a server's stage, and how this machine differs.
+//! `faceoff eval --like-server`: rules, limits and runtimes of a server's stage, and how this machine differs.
 
 use super::differences;
 use crate::competition::competition;
@@ -20,7 +20,7 @@ pub(super) struct ServerStage {
     server: RuntimesView,
     stage: StageView,
     /// Runtimes and limits of agents in the stage.
-    offer: StageResources,
+    resources: StageResources,
 }
 
 impl ServerStage {
@@ -64,8 +64,8 @@ impl ServerStage {
         competition()
             .check_rules(rules)
             .map_err(|error| anyhow!("its stage “{}” has invalid rules: {error}", stage.name))?;
-        let offer = server.stages.iter().find(|offer| offer.id == stage.id);
-        let offer = offer.cloned().with_context(|| {
+        let resources = server.stages.iter().find(|listed| listed.id == stage.id);
+        let resources = resources.cloned().with_context(|| {
             format!(
                 "its stage “{}” is closed and has no limits any more",
                 stage.name
@@ -75,7 +75,7 @@ impl ServerStage {
             url: url.to_owned(),
             server,
             stage,
-            offer,
+            resources,
         })
     }
 
@@ -86,7 +86,7 @@ impl ServerStage {
     /// Replaces the rules and limits of the configuration by the stage's. Runtimes and layers of the sandbox remain
     /// those of this machine.
     pub fn apply(&self, config: &mut Config) {
-        let limits = &self.offer.limits;
+        let limits = &self.resources.limits;
         config.bundle = limits.bundle;
         config.limits = limits.resources.clone();
         config.time = limits.time.clone();
@@ -99,12 +99,12 @@ impl ServerStage {
 
     /// Refuses a bundle whose runtime the stage does not allow or this machine does not offer.
     pub fn check_runtime(&self, runtime: &str, env: &AgentEnvironment) -> anyhow::Result<()> {
-        if !self.offer.runtimes.iter().any(|name| name == runtime) {
+        if !self.resources.runtimes.iter().any(|name| name == runtime) {
             bail!(
                 "agent.toml names the runtime {runtime}, but the stage “{}” of {} allows {}",
                 self.stage.name,
                 self.url,
-                self.offer.runtimes.join(", ")
+                self.resources.runtimes.join(", ")
             );
         }
         ensure!(
@@ -128,7 +128,7 @@ impl ServerStage {
         given_up: &[String],
     ) -> Vec<String> {
         let rules = &self.stage.rules;
-        let limits = &self.offer.limits;
+        let limits = &self.resources.limits;
         let mut lines = vec![
             format!(
                 "like {}: stage “{}”, revision {}, {}",
@@ -153,13 +153,13 @@ impl ServerStage {
             images: env.images && runtime == IMAGE_RUNTIME,
             ..env.clone()
         };
-        let remote = self
+        let servers_runtime = self
             .server
             .runtimes
             .iter()
             .find(|offered| offered.name == runtime);
-        let mut differences = match (take_inventory(&local_env).first(), remote) {
-            (Some(local), Some(remote)) => differences::compare_runtimes(local, remote),
+        let mut differences = match (take_inventory(&local_env).first(), servers_runtime) {
+            (Some(local), Some(server)) => differences::compare_runtimes(local, server),
             _ => Vec::new(),
         };
         let machine = machine::agent_machine(&env.agent_cpus);
@@ -188,7 +188,7 @@ impl ServerStage {
 /// The stage of this name or id; without one, the only open stage, or the only upcoming one.
 fn select_stage(
     stages: Vec<StageView>,
-    offers: &[StageResources],
+    resources: &[StageResources],
     name_or_id: Option<&str>,
 ) -> anyhow::Result<StageView> {
     let names = |stages: &[StageView]| -> Vec<String> {
@@ -208,12 +208,13 @@ fn select_stage(
             .find(matches)
             .with_context(|| format!("it has no stage “{name_or_id}”; it has {all}"));
     }
-    let current: Vec<_> = stages
+    // The server lists resources of stages that are not closed.
+    let not_closed: Vec<_> = stages
         .into_iter()
-        .filter(|stage| offers.iter().any(|offer| offer.id == stage.id))
+        .filter(|stage| resources.iter().any(|listed| listed.id == stage.id))
         .collect();
     for phase in [PhaseView::Open, PhaseView::Upcoming] {
-        let candidates: Vec<_> = current
+        let candidates: Vec<_> = not_closed
             .iter()
             .filter(|stage| stage.phase == phase)
             .cloned()

@@ -25,7 +25,7 @@ pub(super) async fn watch(client: &Client, json: bool, id: GameId) -> anyhow::Re
     let mut attempts = 0;
     while !printer.is_over {
         match read_stream(client, id, &mut printer).await {
-            // The server ends streams after an hour, and when it ends.
+            // The server ends a stream after an hour, and when it shuts down.
             Ok(received) if received > 0 => attempts = 0,
             Ok(_) => attempts += 1,
             Err(error) if is_final(&error) || attempts >= MAX_ATTEMPTS => return Err(error),
@@ -47,7 +47,7 @@ pub(super) async fn watch(client: &Client, json: bool, id: GameId) -> anyhow::Re
     Ok(())
 }
 
-/// The server has refused the request, and not because of too many watchers or a restart.
+/// Has the server refused the request for a lasting reason, not because of too many watchers or a restart?
 fn is_final(error: &anyhow::Error) -> bool {
     error.downcast_ref::<ApiError>().is_some_and(|refused| {
         refused.status.is_client_error() && refused.status != StatusCode::TOO_MANY_REQUESTS
@@ -69,7 +69,7 @@ async fn read_stream(
     while let Some(event) = events.next().await {
         let event = match event {
             Ok(event) => event,
-            // The events before the error are complete.
+            // The events before the error are complete, so the stream is resumed after them.
             Err(_) if received > 0 => break,
             Err(error) => return Err(error),
         };
@@ -89,6 +89,7 @@ struct EventPrinter {
     last_event_id: Option<String>,
     /// Number of the attempt whose snapshot was printed.
     attempt: Option<u32>,
+    /// Was it printed that the game waits for a slot?
     is_waiting: bool,
     is_over: bool,
 }
@@ -111,8 +112,8 @@ impl EventPrinter {
             .context("the server's answer cannot be read; is it another version of Faceoff?")?;
         if self.json {
             let data: Value = serde_json::from_str(&event.data).context("an event")?;
-            let whole = serde_json::json!({"event": event.name, "id": event.id, "data": data});
-            println!("{whole}");
+            let json = serde_json::json!({"event": event.name, "id": event.id, "data": data});
+            println!("{json}");
         } else if let Some(line) = line {
             println!("{line}");
         }
@@ -243,12 +244,11 @@ mod tests {
     fn events_are_printed_with_team_name_and_game_clock() {
         let printer = printer();
         let line = |step: u32, fields: Value| {
-            let mut whole = json!({ "step": step });
-            whole
-                .as_object_mut()
+            let mut json = json!({ "step": step });
+            json.as_object_mut()
                 .unwrap()
                 .extend(fields.as_object().unwrap().clone());
-            printer.happening_line(&serde_json::from_value(whole).unwrap())
+            printer.happening_line(&serde_json::from_value(json).unwrap())
         };
         assert_eq!(
             line(3605, json!({"kind": "goal", "by": 2, "score": [0, 1]})),

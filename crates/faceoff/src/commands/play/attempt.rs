@@ -1,4 +1,4 @@
-//! One attempt at a game, which ends when an agent that has never answered is silent at its start.
+//! One attempt at a game. It ends without a result if an agent starts without an answer and has not answered before.
 
 use super::{bar::Bar, matchup::Matchup, table};
 use crate::commands::{
@@ -15,7 +15,7 @@ use std::{path::Path, sync::mpsc, thread};
 pub(super) enum AttemptError {
     #[error(transparent)]
     Platform(#[from] PlatformFault),
-    /// An agent never answered.
+    /// An agent never answered; the text says which, and for how long.
     #[error("{0}")]
     Silent(String),
 }
@@ -76,7 +76,7 @@ impl<'a> GamePlayer<'a> {
             });
             let Attempt { seed, swapped, out } = *attempt;
             let played = self.matchup.play(seed, swapped, out, &mut observer);
-            // Ends the thread above.
+            // Closes the channel, which ends the thread above.
             observer.ended_start = None;
             played
         });
@@ -109,16 +109,17 @@ impl<'a> GamePlayer<'a> {
     }
 }
 
-/// Shows the progress of a game, and stops it after the silent start of an agent that has never answered: every other start would be
-/// as silent.
+/// Shows the progress of a game, and stops it if a start of an agent ends without an answer and the agent has not answered before: its
+/// other starts would end in the same way.
 struct StartObserver<'a> {
     bar: &'a Bar,
     /// By side.
     has_answered: [bool; 2],
     /// Reports the end of each start; `None` when the game is over.
     ended_start: Option<mpsc::Sender<()>>,
+    /// The side whose agent never answered, and the fault of its start.
     silent: Option<(Side, AgentFault)>,
-    /// The log of the silent side.
+    /// The log of that side.
     log: String,
 }
 

@@ -6,7 +6,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 /// A progress bar, shown if standard error is a terminal.
 pub(super) struct Bar {
     bar: ProgressBar,
-    /// Text before the score.
+    /// Text before the score: the name of the game's folder in a series, or empty.
     title: String,
 }
 

@@ -16,7 +16,7 @@ use tempfile::TempDir;
 pub(super) struct Matchup {
     bundles: [Bundle; 2],
     envs: [AgentEnvironment; 2],
-    /// Settings of a game; each game replaces the seed.
+    /// Settings of a game; each game has its own seed in place of this one's.
     spec: GameSpec,
     /// Holds the unpacked bundles.
     _scratch: TempDir,
@@ -127,7 +127,7 @@ fn environments(
 ) -> anyhow::Result<[AgentEnvironment; 2]> {
     let cpus = affinity::allowed_cpus().context("reading the CPU affinity of this process")?;
     let layout = CpuLayout::divide(&cpus, 1, 2);
-    if layout.shared && !options.json {
+    if layout.agents_share_cpus && !options.json {
         println!(
             "note: the agents share {} CPUs with each other and the simulator; answers may take longer, but \
             time lost to other processes is measured separately",

@@ -135,7 +135,7 @@ mod tests {
     #[test]
     fn options_become_valid_rules_and_settings() {
         let rules = |args: &[&str]| options(args).rules().unwrap().unwrap();
-        // `--steps` wins over the "steps" of `--rules`.
+        // Of `--steps` and "steps" in `--rules`, the option counts.
         let all = rules(&[
             "--format",
             "groups",

@@ -1,4 +1,5 @@
-//! Starts and supervises the slots of a worker process; each slot is a thread that runs one job at a time.
+//! Starts and supervises the slots of a worker process; each slot is a thread that runs one job at a time. Also holds their
+//! configuration.
 
 use crate::{
     boxed,
@@ -54,11 +55,11 @@ impl Default for Intervals {
     }
 }
 
-/// Configuration of the workers of a server process.
+/// Configuration of the server's own worker, which runs in its process.
 #[derive(Debug, Clone)]
 pub struct WorkerConfig {
     pub slots: SlotsConfig,
-    /// The kinds of jobs that they run.
+    /// The kinds of jobs that its slots run.
     pub job_filter: JobFilter,
     /// Duration of a lease without renewal, seconds. After a crash, jobs wait this long.
     pub lease_s: u32,
@@ -129,7 +130,7 @@ impl WorkerConfig {
     }
 }
 
-/// `slots_server` is the server that the slots use; in tests it may wrap `server`.
+/// [`run`] with another evaluator and other intervals. `slots_server` is the server that the slots use; in tests it may wrap `server`.
 pub(crate) async fn run_with(
     server: LocalServer,
     slots_server: Arc<dyn JobServer>,
@@ -139,8 +140,8 @@ pub(crate) async fn run_with(
     shutdown: CancellationToken,
 ) -> anyhow::Result<()> {
     anyhow::ensure!(config.lease_s > 0, "a lease lasts at least one second");
-    let fits = server.competition().check();
-    fits.map_err(|problem| anyhow::anyhow!("the competition is refused: {problem}"))?;
+    let checked = server.competition().check();
+    checked.map_err(|problem| anyhow::anyhow!("the competition is refused: {problem}"))?;
     let folder = config.slots.scratch_dir.clone();
     let scratch = tokio::task::spawn_blocking(move || Scratch::take(&folder)).await??;
 
@@ -242,15 +243,19 @@ pub(crate) async fn run_slots(
             server,
             shutdown: stop.clone(),
         };
-        let end = start(&config.threads, index, slot)?;
+        let end = start_thread(&config.threads, index, slot)?;
         // The task fails with the slot's index if its thread panics.
         slots.spawn(async move { end.await.map_err(|_| index) });
     }
-    wait_for(slots, intervals.shutdown_grace, &stop).await
+    wait_for_slots(slots, intervals.shutdown_grace, &stop).await
 }
 
 /// Starts a slot's thread. The receiver gets a value at its normal end, and an error if it panics.
-fn start(threads: &SlotThreads, index: usize, slot: Slot) -> anyhow::Result<oneshot::Receiver<()>> {
+fn start_thread(
+    threads: &SlotThreads,
+    index: usize,
+    slot: Slot,
+) -> anyhow::Result<oneshot::Receiver<()>> {
     let (ended, end) = oneshot::channel();
     threads
         .start(format!("faceoff-slot-{index}"), move || {
@@ -263,9 +268,9 @@ fn start(threads: &SlotThreads, index: usize, slot: Slot) -> anyhow::Result<ones
     Ok(end)
 }
 
-/// Waits for the end of all slots. If one dies, the others are stopped too: a server must not look healthy while it runs
-/// only part of its jobs.
-async fn wait_for(
+/// Waits for the end of all slots, but after `stop` no longer than the grace period. If a slot dies, the others are stopped, too: a
+/// server must not look healthy while only part of its slots run.
+async fn wait_for_slots(
     mut slots: JoinSet<Result<(), usize>>,
     shutdown_grace: Duration,
     stop: &CancellationToken,
@@ -297,8 +302,8 @@ async fn wait_for(
     }
 }
 
-/// Keeps the metric of stuck slots up to date. A slot is stuck if its thread is blocked although its agents have ended. The server's
-/// health depends on it.
+/// Keeps the metric of stuck slots up to date. A slot is stuck if its thread is blocked although its agents have ended. A server with
+/// such a slot reports itself as not healthy.
 async fn report_stuck_slots(metrics: Metrics, stop: CancellationToken) {
     const INTERVAL: Duration = Duration::from_secs(1);
     loop {
