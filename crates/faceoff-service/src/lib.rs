@@ -4,7 +4,6 @@
 //! This crate unpacks no bundle, runs no agent and computes no score; workers and `faceoff-scoring` do. It reads no clock
 //! and no environment that is not passed in, and defines no routes.
 
-pub mod accept;
 pub mod agent_resources;
 mod aggregated_rows;
 pub mod answer_cache;
@@ -14,8 +13,10 @@ pub mod archive_contents;
 pub mod auth;
 pub mod change_quota;
 pub mod config;
+pub mod content_negotiation;
 pub mod credential;
 pub mod csv;
+pub mod day_release;
 pub mod download;
 pub mod episode_path;
 pub mod extract;
@@ -29,7 +30,6 @@ pub mod priority_permits;
 pub mod problem;
 pub mod rate_limits;
 mod recent_callers;
-pub mod release;
 pub mod request_log;
 pub mod request_preconditions;
 pub mod services;
@@ -44,5 +44,6 @@ mod upload_slots;
 pub mod viewer;
 pub mod views;
 
-/// `#[boxed]` on an `async fn` that other crates await makes it return a boxed future. Without it each of these crates would compile the body.
+/// `#[boxed]` on an `async fn` that other crates await makes it return a boxed future. Without it each of these crates would compile the
+/// body.
 pub(crate) use async_recursion::async_recursion as boxed;

@@ -3,8 +3,8 @@
 
 use super::{
     game::GameEntry,
-    penalty_points::{violation_names, violation_points},
     game_result::{ForfeitKind, GameResult, ResultReason},
+    penalty_points::{violation_names, violation_points},
     rules::{GameTally, final_score, forfeit_score, judge},
     side::Side,
 };

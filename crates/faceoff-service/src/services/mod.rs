@@ -4,7 +4,7 @@
 pub mod accounts;
 pub mod announcements;
 pub mod bundle_stream;
-pub mod clock;
+pub mod clock_step;
 pub mod decisions;
 pub mod departures;
 pub mod entrants;
