@@ -8,6 +8,7 @@ pub mod agent_resources;
 mod aggregated_rows;
 pub mod answer_cache;
 pub mod api_document;
+// The state that all request handlers share.
 pub mod app;
 pub mod archive_contents;
 pub mod auth;
@@ -19,10 +20,12 @@ pub mod csv;
 pub mod day_release;
 pub mod download;
 pub mod episode_path;
+// Extractors of bodies, forms, queries and path parameters.
 pub mod extract;
 pub mod free_space;
 pub mod highlight;
 pub mod link_key;
+// Networks of IP addresses, by which limits per client count.
 pub mod network;
 mod partial_uploads;
 pub mod passwords;
@@ -37,10 +40,12 @@ pub mod session;
 mod shared_cache;
 pub mod shutdown;
 mod summaries;
+// Validation of text from users.
 pub mod text;
 pub mod timeouts;
 pub mod transfer_rate;
 mod upload_slots;
+// Who views a public resource: organiser, team or visitor.
 pub mod viewer;
 pub mod views;
 

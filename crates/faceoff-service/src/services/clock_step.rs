@@ -1,7 +1,7 @@
 //! A step (sudden change) of the system clock. The server continues its own time until an organiser accepts the step, because the new
 //! time is correct.
 
-use super::decisions::Preview;
+use super::decision_preview::Preview;
 use crate::{
     app::AppState,
     boxed,

@@ -5,7 +5,7 @@ pub mod accounts;
 pub mod announcements;
 pub mod bundle_stream;
 pub mod clock_step;
-pub mod decisions;
+pub mod decision_preview;
 pub mod departures;
 pub mod entrants;
 pub mod evaluations;
