@@ -120,18 +120,13 @@ impl WaitLedger {
         }
     }
 
-    /// Starts with the first sample, `now`. `before_question`: the counters read before the question. `stolen`: steal time since then, in
+    /// Starts with the first sample, `now`. `before`: the counters that were read before the question. `stolen`: steal time since then, in
     /// which the hypervisor had stopped the agent's CPUs. A runnable thread without a time slice since then may have slept in between, so
     /// at most the steal time counts as its wait.
-    pub(crate) fn begin(
-        &mut self,
-        before_question: &ThreadWaits,
-        now: &ThreadWaits,
-        stolen: Duration,
-    ) {
+    pub(crate) fn begin(&mut self, before: &ThreadWaits, now: &ThreadWaits, stolen: Duration) {
         for (id, thread) in &now.threads {
             let entry = self.0.entry(*id).or_default();
-            let earlier = before_question.threads.get(id);
+            let earlier = before.threads.get(id);
             if thread.is_runnable
                 && earlier.is_some_and(|earlier| earlier.time_slices == thread.time_slices)
             {

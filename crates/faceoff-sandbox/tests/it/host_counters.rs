@@ -182,7 +182,7 @@ fn refused_calls_have_the_errors_of_older_kernels() {
 
 /// Control: without the seccomp filter the same agents can signal to each other, so the tests above are able to fail.
 #[test]
-fn without_layers_agents_can_signal() {
+fn without_seccomp_agents_can_signal_to_each_other() {
     let mut subject = Subject::new("host_counters", &[]);
     let Isolation::Sandboxed { disabled_layers } = &mut subject.spec.isolation else {
         unreachable!()

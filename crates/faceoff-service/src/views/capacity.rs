@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn fit_and_summary_follow_from_hours() {
+    fn forecast_and_its_text_follow_from_hours() {
         for (expected_hours, worst_hours, available_hours, fit, phrase) in [
             (Some(10.0), 20.0, Some(24.0), Fit::Surely, "it fits"),
             (None, 20.0, Some(24.0), Fit::Surely, "it fits"),
