@@ -8,7 +8,7 @@ use axum::{
 };
 use faceoff_api::paths::API_BASE;
 use faceoff_service::{
-    accept::wants_page,
+    content_negotiation::wants_page,
     problem::{Problem, ProblemKind},
 };
 

@@ -111,7 +111,7 @@ pub(super) async fn page(
         other_stages: other_stages
             .map(|other| (other.name.to_string(), format!("?stage={}", other.id)))
             .collect(),
-        is_hidden: visibility.is_hidden(stage.id),
+        is_hidden: visibility.hides_scores(stage.id),
         has_tiers: bounds.is_some(),
         latest: history
             .rows

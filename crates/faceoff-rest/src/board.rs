@@ -12,8 +12,8 @@ use faceoff_api::{
     views::{board::BoardView, history::HistoryView},
 };
 use faceoff_service::{
-    accept::wants_csv,
     app::App,
+    content_negotiation::wants_csv,
     csv::{CsvFormat, MEDIA_TYPE, Table},
     extract::{PathParam, QueryParams},
     problem::Problem,

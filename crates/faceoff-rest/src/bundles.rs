@@ -18,7 +18,7 @@ use faceoff_service::{
     extract::{OptionalJson, PathParam},
     problem::Problem,
     request_preconditions::RequestPreconditions,
-    services::decisions::checked_reason,
+    services::decision_preview::checked_reason,
     views::submission,
 };
 use faceoff_store::{StoreError, Submission};

@@ -8,7 +8,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use faceoff_service::{
-    accept::accepts_gzip,
+    content_negotiation::accepts_gzip,
     problem::Problem,
     request_preconditions::{ETag, RequestPreconditions},
 };

@@ -3,7 +3,7 @@
 use axum::{extract::State, http::StatusCode};
 use faceoff_api::requests::Confirmation;
 use faceoff_service::{
-    app::App, auth::Organiser, extract::Json as Body, problem::Problem, services::clock,
+    app::App, auth::Organiser, extract::Json as Body, problem::Problem, services::clock_step,
 };
 
 /// Accepts the time of the system clock after it was set, so that the server uses it.
@@ -22,6 +22,6 @@ pub(crate) async fn accept_clock(
     State(app): State<App>,
     Body(Confirmation { confirm }): Body<Confirmation>,
 ) -> Result<StatusCode, Problem> {
-    clock::accept_step(&app, organiser.actor(), confirm.as_deref()).await?;
+    clock_step::accept_step(&app, organiser.actor(), confirm.as_deref()).await?;
     Ok(StatusCode::NO_CONTENT)
 }

@@ -13,7 +13,7 @@ use faceoff_service::{
     auth::Organiser,
     extract::{Json as Body, OptionalJson, PathParam},
     problem::{Problem, ProblemKind},
-    services::decisions::checked_reason,
+    services::decision_preview::checked_reason,
     viewer::Viewer,
     views::proposal,
 };

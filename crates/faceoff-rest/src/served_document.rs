@@ -6,8 +6,8 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use faceoff_service::{
-    accept::accepts_gzip,
     api_document::ApiDocument,
+    content_negotiation::accepts_gzip,
     request_preconditions::{ETag, RequestPreconditions},
 };
 use flate2::{Compression, write::GzEncoder};

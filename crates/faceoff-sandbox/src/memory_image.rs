@@ -6,7 +6,7 @@
 
 use crate::{
     Runtime, RuntimeFiles, SandboxError, bubblewrap::mount_order, error::IoContext, file_tree,
-    owner::Owner, runtime::path_in_image,
+    owner::Owner, runtime::path_in_copy,
 };
 use rustix::fs::{StatVfs, statvfs};
 use std::{
@@ -59,7 +59,7 @@ impl MemoryImage {
             .tempdir_in(MEMORY_FOLDER)
             .context("cannot make a folder in memory")?;
         for path in paths(runtimes) {
-            let target = path_in_image(folder.path(), &path);
+            let target = path_in_copy(folder.path(), &path);
             let copied = fs::create_dir_all(target.parent().unwrap_or(folder.path()))
                 .and_then(|()| file_tree::copy(&path, &target));
             copied.context(format_args!("cannot copy {} into memory", path.display()))?;
@@ -144,7 +144,7 @@ mod tests {
         assert!((12_000..100_000).contains(&image.bytes), "{}", image.bytes);
         let folder = image.folder().to_owned();
         assert_eq!(runtimes["two"].files, RuntimeFiles::Copy(folder.clone()));
-        let copy_of = |name: &str| path_in_image(&folder, &path_of(name));
+        let copy_of = |name: &str| path_in_copy(&folder, &path_of(name));
         assert_eq!(fs::read_to_string(copy_of("lib/link")).unwrap(), "content");
         assert_eq!(
             fs::read_link(copy_of("lib/link")).unwrap(),

@@ -1,8 +1,8 @@
 //! The agent's network namespace, in which nothing of the host's network shows.
 //!
 //! bubblewrap could make the namespace as well. But files of `/proc/PID/net` show counters of the whole host, such as the number of its
-//! connections and packets, which visitors change. Files of one namespace have one mode for all processes. So the child, while it is still
-//! root, makes the namespace and removes all permissions of its files.
+//! connections and packets, which visitors change. All processes of a namespace see these files with the same permissions. So the child,
+//! while it is still root, makes the namespace and removes all permissions once: they stay removed for the agent, who is not root.
 
 use crate::{SandboxError, error::IoContext};
 use rustix::{
@@ -18,6 +18,7 @@ use std::{
     os::{fd::AsRawFd, unix::ffi::OsStrExt},
 };
 
+/// The kernel's files about the network namespace of the process that opens them.
 const FOLDER: &str = "/proc/self/net";
 /// Files that show the namespace's own state only, and that programs read to list interfaces.
 const READABLE_FILES: [&str; 4] = ["dev", "if_inet6", "ipv6_route", "route"];
@@ -31,6 +32,8 @@ const BUFFER_LIMITS: &[(&CStr, &[u8])] = &[
 /// The network of one agent.
 #[derive(Debug)]
 pub(crate) struct PrivateNetwork {
+    /// Paths below [`FOLDER`] that lose their permissions: all but [`READABLE_FILES`]. They are listed before the fork, since listing
+    /// allocates.
     hidden_files: Vec<CString>,
 }
 
@@ -53,7 +56,7 @@ impl PrivateNetwork {
         }
         start_loopback()?;
         for (setting, value) in BUFFER_LIMITS {
-            // Best effort, since a container may have a read-only `/proc/sys`; the number of sockets is limited, too.
+            // A failure is ignored, since a container may have a read-only `/proc/sys`; the number of sockets is limited in any case.
             let file = open(*setting, OFlags::WRONLY | OFlags::CLOEXEC, Mode::empty());
             let _ = file.and_then(|file| write(&file, value));
         }
@@ -70,7 +73,8 @@ impl PrivateNetwork {
 
 /// Starts the loopback interface, which programs expect.
 fn start_loopback() -> Result<(), Errno> {
-    let any = socket_with(
+    // The request below needs any socket of the namespace, and does not use it otherwise.
+    let socket = socket_with(
         AddressFamily::INET,
         SocketType::DGRAM,
         SocketFlags::CLOEXEC,
@@ -83,7 +87,11 @@ fn start_loopback() -> Result<(), Errno> {
         request.ifr_name[0] = b'l' as libc::c_char;
         request.ifr_name[1] = b'o' as libc::c_char;
         request.ifr_ifru.ifru_flags = (libc::IFF_UP | libc::IFF_RUNNING) as libc::c_short;
-        libc::ioctl(any.as_raw_fd(), libc::SIOCSIFFLAGS as _, &raw const request)
+        libc::ioctl(
+            socket.as_raw_fd(),
+            libc::SIOCSIFFLAGS as _,
+            &raw const request,
+        )
     };
     if result == 0 {
         return Ok(());

@@ -37,7 +37,7 @@ pub fn probe_host() -> Vec<LayerProbe> {
     Layer::ALL.into_iter().map(probe).collect()
 }
 
-/// Those of these layers that this user cannot get on this host. One process suffices to see that there are none.
+/// Which of `layers` this user cannot get on this host. First starts one process with all of them; only if that fails, one for each layer.
 ///
 /// # Errors
 /// If not even a process without any layer can be started: then the cause is none of the layers.
@@ -47,7 +47,7 @@ pub fn unavailable_layers(layers: &[Layer]) -> Result<Vec<LayerProbe>, String> {
     }
     run(&[], "cat", &["/dev/null"])?;
     let probed = layers.iter().copied().map(probe);
-    Ok(probed.filter(|feature| !feature.available).collect())
+    Ok(probed.filter(|probe| !probe.available).collect())
 }
 
 fn probe(layer: Layer) -> LayerProbe {
@@ -85,10 +85,10 @@ fn field<'a>(text: &'a str, name: &str) -> Option<&'a str> {
 }
 
 fn probe_namespaces() -> Result<String, String> {
-    // Its fix is reported separately.
+    // Without a usable bubblewrap this is the error, and `fix` says how to install it.
     BubblewrapProgram::find().map_err(|problem| problem.to_string())?;
     let bubblewrap = Bubblewrap::find().map_err(|error| error.to_string())?;
-    // Inside, the process is the second one, has no capabilities, and sees only its own network.
+    // In its namespaces the process is number 2 (bubblewrap's is number 1), has no capabilities, and sees only its own network.
     let status = run_cat(Layer::Namespaces, "/proc/self/status")?;
     if field(&status, "Pid:") != Some("2") || field(&status, "CapBnd:") != Some("0000000000000000")
     {
@@ -124,7 +124,7 @@ fn probe_seccomp() -> Result<String, String> {
     if field(&status, "Seccomp:") != Some("2") {
         return Err("a filter was installed, but it is not active".to_owned());
     }
-    // Free blocks, as the service answers for the kernel.
+    // The service answers the call `statfs` (as `stat -f` makes it) in the kernel's place: with the free blocks of an empty scratch folder.
     let answer = run(&[Layer::Seccomp], "stat", &["-f", "-c", "%a", "/"])?;
     let expected = answered_calls::free_blocks(Limits::default().scratch_bytes);
     if answer.trim() != expected.to_string() {
@@ -145,7 +145,7 @@ fn probe_cgroup(layer: Layer, controller: &str) -> Result<String, String> {
                 names if names.split(',').any(|name| name == controller) => "v1",
                 _ => return None,
             };
-            // A hybrid host also has the unified line, but the agent is not in that hierarchy.
+            // A host with both cgroup versions also lists a line of version 2, but the agent's cgroup (`agent-…`) is not in that hierarchy.
             path.contains("/agent-").then(|| {
                 format!(
                     "cgroup {version}, limits accepted{}",
@@ -194,12 +194,12 @@ fn run_cat(layer: Layer, file: &str) -> Result<String, String> {
     run(&[layer], "cat", &[file])
 }
 
-/// Starts a program of the system with only these layers enabled, and returns its output.
+/// Starts a program of the host, such as `cat`, with only these layers enabled, and returns its output.
 fn run(layers: &[Layer], program: &str, arguments: &[&str]) -> Result<String, String> {
     let candidates = ["/usr/bin", "/bin"].map(|folder| Path::new(folder).join(program));
     let found = candidates.iter().find(|path| path.is_file());
     let program = found.ok_or_else(|| format!("the probe needs /usr/bin/{program}"))?;
-    let (_private, bundle) = make_bundle(layers)
+    let (_outer, bundle) = make_bundle(layers)
         .map_err(|error| format!("cannot make a folder for the probe: {error}"))?;
     let mut runtime = Runtime::native();
     runtime.read_only_paths.push(program.clone());

@@ -32,10 +32,12 @@ const EXIT_TIMEOUT: Duration = Duration::from_millis(500);
 #[derive(Debug)]
 pub struct AgentProcess {
     lines: LineSocket,
+    /// Name of the agent's output in `/proc/PID/fd`, such as `socket:[123]`, by which it is found whether a process still has it open.
     output_name: String,
     stderr: StderrLog,
     tree: ProcessTree,
     limits: Limits,
+    /// When to check next whether the agent has closed its output.
     output_poll: PollInterval,
     /// The threads whose scheduling counters are read.
     threads: TrackedThreads,
@@ -52,7 +54,7 @@ pub struct Usage {
     pub peak_memory_bytes: Option<u64>,
     /// CPU time of the tree in seconds; `None` if the host does not report it.
     pub cpu_time_s: Option<f64>,
-    /// The end of standard error, lossy UTF-8.
+    /// The beginning and the end of standard error, lossy UTF-8.
     pub stderr: String,
     /// How it ended on its own, if not with status 0. `None` also if the service killed it.
     pub exit: Option<AgentFaultKind>,
@@ -224,8 +226,9 @@ impl AgentProcess {
         Ok(())
     }
 
-    /// The next check whether the agent has closed its output, or `deadline` if it is earlier. Without a sandbox the kernel reports a
-    /// closed output at once, so no checks are needed.
+    /// The next check whether the agent has closed its output, or `deadline` if it is earlier. In the sandbox bubblewrap's processes keep
+    /// the output open, so the kernel does not report that the agent has closed it. Without a sandbox the kernel does, and no checks are
+    /// needed.
     fn next_poll_or_deadline(&self, deadline: Instant) -> Instant {
         if self.tree.is_sandboxed() {
             deadline.min(self.output_poll.next_check_at)
@@ -393,6 +396,7 @@ impl AgentProcess {
         Ok(!pending.context("cannot look at the agent's output")?)
     }
 
+    /// Waits at most `wait` for the agent's end, and keeps its cause; `None` while the agent runs.
     fn observe_end(&mut self, wait: Duration) -> Option<&ExitCause> {
         if self.end.is_none() {
             let status = match self.tree.wait(Instant::now() + wait) {

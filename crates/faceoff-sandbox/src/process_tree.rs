@@ -20,7 +20,8 @@ const KILL_TIMEOUT: Duration = Duration::from_secs(60);
 /// How long to wait for bubblewrap to exit after its sandbox has ended.
 const BUBBLEWRAP_EXIT_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// How long to wait for the thread that answers system calls. Without namespaces and a cgroup a process that is still alive may need it.
+/// How long to wait for the end of the thread that answers system calls. Without namespaces and a cgroup a process may escape the kill, and
+/// the thread goes on answering it.
 const ANSWER_THREAD_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// The child, its descendants, and the resources that contain them.
@@ -33,7 +34,7 @@ pub(crate) struct ProcessTree {
     child_pidfd: OwnedFd,
     /// Pidfd of the sandbox's first process, whose end terminates all others in the sandbox.
     sandbox_init: Option<OwnedFd>,
-    /// Its number on the host.
+    /// Pid of the sandbox's first process, as the host numbers it (inside it is 1).
     init_pid: Option<Pid>,
     pub(crate) status: Option<StatusPipe>,
     pub(crate) cgroup: Option<AgentCgroup>,
@@ -135,8 +136,8 @@ impl ProcessTree {
         Ok(self.exit_status)
     }
 
-    /// Ends the sandbox's first process, and with it all others, after bubblewrap has ended with the agent. The kernel would do it, too, but
-    /// a moment later.
+    /// Ends the sandbox's first process, and with it all others, after bubblewrap has ended with the agent. The kernel would do it, too,
+    /// but a moment later.
     fn end_sandbox(&self) {
         let Some(init) = &self.sandbox_init else {
             return;
@@ -250,13 +251,13 @@ impl Drop for ProcessTree {
 /// Current parent and process group of a process.
 fn parent_and_group(pid: i32) -> Option<(i32, i32)> {
     let stat = fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
-    // The command's name, in parentheses, may contain anything; the fields after it are plain.
+    // The command's name, in parentheses, may contain spaces and parentheses; the fields after it contain neither.
     let mut fields = stat.rsplit_once(')')?.1.split_whitespace().skip(1);
     Some((fields.next()?.parse().ok()?, fields.next()?.parse().ok()?))
 }
 
-/// The other members of `root`'s process group, and all descendants that are still linked to it, without `root`
-/// itself.
+/// The other members of `root`'s process group, and the descendants that are found from parent to child, without `root` itself. A process
+/// in a group of its own whose parent has ended is not found.
 fn group_and_descendants(root: Pid) -> Vec<Pid> {
     let root = root.as_raw_nonzero().get();
     let entries = fs::read_dir("/proc").into_iter().flatten().flatten();

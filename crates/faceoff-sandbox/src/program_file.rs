@@ -21,9 +21,9 @@ const HOST_MACHINE: u16 = 183;
 /// A program of the bundle.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum ProgramFile {
-    /// It cannot run on this host; the text says why.
+    /// It cannot run on this host; the text says why, as a predicate: "is a program for Windows; build it for Linux".
     Unusable(String),
-    /// It may start. The text names the file of the runtime that it needs, if any, and what to do if that is missing.
+    /// It may start. The text, a sentence, names the interpreter or loader that it needs, if any, and what to do if that is missing.
     MayStart(Option<String>),
 }
 
@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn program_is_read_only_within_the_bundle() {
+    fn program_outside_of_the_bundle_is_not_read() {
         let host = tempfile::tempdir().unwrap();
         let bundle = host.path().join("bundle");
         fs::create_dir(&bundle).unwrap();

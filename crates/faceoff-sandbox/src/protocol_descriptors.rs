@@ -23,30 +23,30 @@ pub(crate) struct ProtocolDescriptors {
 }
 
 impl ProtocolDescriptors {
-    /// The ends, moved to other numbers than those that they get.
+    /// Copies of the ends with numbers above 4, so that [`Self::pass`] overwrites neither of them.
     pub(crate) fn new(questions: &OwnedFd, answers: &OwnedFd) -> Result<Self, SandboxError> {
-        let moved = |end| fcntl_dupfd_cloexec(end, ANSWERS + 1).context(ACTION);
+        let copy_above = |end| fcntl_dupfd_cloexec(end, ANSWERS + 1).context(ACTION);
         Ok(Self {
-            questions: moved(questions)?,
-            answers: moved(answers)?,
+            questions: copy_above(questions)?,
+            answers: copy_above(answers)?,
         })
     }
 
-    /// Reserves both numbers in this process, so that no descriptor that an agent's process needs before its exec has one of them. What has
-    /// them already must keep them: call it before other threads open and close files.
+    /// Reserves both numbers in this process: it opens `/dev/null` under them for good. So no descriptor that an agent's process needs
+    /// before its exec has one of them. A file that has one already keeps it, so call this before other threads open and close files.
     pub(crate) fn reserve() -> Result<(), SandboxError> {
         static RESERVED: Mutex<Vec<OwnedFd>> = Mutex::new(Vec::new());
         let mut reserved = RESERVED.lock().unwrap_or_else(PoisonError::into_inner);
-        let empty =
+        let dev_null =
             open(c"/dev/null", OFlags::RDWR | OFlags::CLOEXEC, Mode::empty()).context(ACTION)?;
         for number in [QUESTIONS, ANSWERS] {
-            let free = fcntl_dupfd_cloexec(&empty, number).context(ACTION)?;
-            if free.as_raw_fd() <= ANSWERS {
-                reserved.push(free);
+            let lowest_free = fcntl_dupfd_cloexec(&dev_null, number).context(ACTION)?;
+            if lowest_free.as_raw_fd() <= ANSWERS {
+                reserved.push(lowest_free);
             }
         }
-        if empty.as_raw_fd() <= ANSWERS {
-            reserved.push(empty);
+        if dev_null.as_raw_fd() <= ANSWERS {
+            reserved.push(dev_null);
         }
         Ok(())
     }
@@ -55,7 +55,8 @@ impl ProtocolDescriptors {
     pub(crate) fn pass(&self) -> Result<(), Errno> {
         for (end, number) in [(&self.questions, QUESTIONS), (&self.answers, ANSWERS)] {
             #[expect(unsafe_code, reason = "a descriptor is chosen by its number")]
-            // SAFETY: the number is not closed here. In this child, whose other descriptors close with the exec, nothing uses what it named.
+            // SAFETY: the number is not closed here. In this child, whose other descriptors close with the exec, nothing uses what it
+            // named.
             let mut target = ManuallyDrop::new(unsafe { OwnedFd::from_raw_fd(number) });
             dup2(end, &mut target)?;
         }

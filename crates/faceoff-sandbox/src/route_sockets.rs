@@ -2,7 +2,7 @@
 //!
 //! Such a socket also shows counters of the neighbour tables of all networks of the host, which any agent can change. So the service makes
 //! the socket, in the agent's network, with a filter that passes answers about interfaces and addresses only, and that the agent cannot
-//! take off.
+//! remove.
 
 use crate::caller::Caller;
 use rustix::io::Errno;
@@ -87,8 +87,8 @@ fn make_in(
     // Without a signal at its end, so that no other code of this process waits for it.
     let flags = libc::CLONE_VM | libc::CLONE_VFORK | libc::CLONE_FILES;
     #[expect(unsafe_code, reason = "a fork would copy all tables of this process")]
-    // SAFETY: the process runs `run` on a stack of its own, and this thread waits until it has ended. A socket that it made is in the shared
-    // table of files and has no other owner.
+    // SAFETY: the process runs `run` on a stack of its own, and this thread waits until it has ended. A socket that it made is in the
+    // shared table of files and has no other owner.
     unsafe {
         let top = stack.as_mut_ptr_range().end;
         let pid = libc::clone(run, top.cast(), flags, (&raw mut request).cast());
@@ -120,7 +120,7 @@ fn attach_filter(socket: &OwnedFd) -> io::Result<()> {
     for (index, answer) in (0..).zip(ANSWERS) {
         program.push(libc::sock_filter {
             code: JUMP_EQUAL,
-            // To the last instruction.
+            // To the last instruction, which lets the message pass; the one before it drops the message.
             jt: count - index,
             jf: 0,
             // A filter reads numbers with the higher byte first, and the kernel writes this one as the machine does.

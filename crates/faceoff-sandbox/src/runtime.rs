@@ -8,9 +8,9 @@ use std::{
     process::{Command, Stdio},
 };
 
-/// Folders of shared libraries and of the dynamic loader, as distributions lay them out, and what programs find on every host: the links
-/// of Debian's alternatives, through which libraries and programs are reached, and the time zones. On hosts with
-/// a merged /usr the short paths are links, and the sandbox has the same links.
+/// Folders of shared libraries and of the dynamic loader, as distributions lay them out. Also the links of Debian's alternatives, through
+/// which libraries and programs are reached, and the time zones. On hosts with a merged /usr the short paths are links, and the sandbox has
+/// the same links.
 pub(crate) const LIBRARY_PATHS: [&str; 11] = [
     "/etc/alternatives",
     "/usr/share/zoneinfo",
@@ -143,7 +143,7 @@ impl Runtime {
     /// Host path of the files that the sandbox shows at `path`. A symbolic link appears as the same link.
     pub(crate) fn source(&self, path: &Path) -> PathBuf {
         match &self.files {
-            RuntimeFiles::Copy(copy) if !path.is_symlink() => path_in_image(copy, path),
+            RuntimeFiles::Copy(copy) if !path.is_symlink() => path_in_copy(copy, path),
             _ => path.to_owned(),
         }
     }
@@ -161,8 +161,8 @@ impl Runtime {
     }
 }
 
-/// The path at which a copy of the host's files holds `path`.
-pub(crate) fn path_in_image(image: &Path, path: &Path) -> PathBuf {
+/// The path at which `copy`, the folder of [`RuntimeFiles::Copy`], holds the host's `path`.
+pub(crate) fn path_in_copy(copy: &Path, path: &Path) -> PathBuf {
     image.join(path.strip_prefix("/").unwrap_or(path))
 }
 

@@ -1,7 +1,7 @@
 //! Links of a runtime that lead to files which agents do not see.
 //!
 //! Distributions keep parts of a program elsewhere and link to them, as from `/usr/lib/jvm` to `/etc`. Inside the sandbox such a link leads
-//! nowhere, and the program fails with an error that names neither.
+//! nowhere, and the program fails with an error that names neither the link nor its target.
 
 use crate::{Runtime, runtime::LIBRARY_PATHS};
 use rustix::fs::{Mode, OFlags, ResolveFlags, open, openat2};
@@ -11,12 +11,13 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Entries of folders that are looked at.
+/// Most folder entries that a search examines.
 const MAX_ENTRIES: usize = 500_000;
-/// Links that are followed to a program.
+/// Most links that are followed from one name to a program.
 const MAX_LINKS: usize = 40;
-/// Targets are put together by this many components, as in `/etc/java-17-openjdk` and `/usr/share/nodejs`.
+/// Targets that agree in this many components of their paths, with the root as the first, are reported as one: `/etc/java-17-openjdk`.
 const GROUP_COMPONENTS: usize = 3;
+/// The same below `/usr`: `/usr/share/nodejs`.
 const GROUP_COMPONENTS_BELOW_USR: usize = 4;
 
 /// Links into one folder that agents do not see.
@@ -38,14 +39,14 @@ impl Runtime {
         let mut found: BTreeMap<PathBuf, HiddenTarget> = BTreeMap::new();
         let is_system = |path: &Path| LIBRARY_PATHS.iter().any(|system| path == Path::new(system));
         let mut folders = self.read_only_paths.clone();
-        // Some of them are links, as `/lib64` to `/usr/lib64`.
+        // Folders of the system are not searched. Those that are links themselves, as `/lib64` to `/usr/lib64`, are examined as links.
         folders.retain(|path| !is_system(path) || path.is_symlink());
         let programs: Vec<_> = folders
             .iter()
             .filter_map(|path| home_of_program(path))
             .collect();
         folders.extend(programs);
-        let mut seen = 0;
+        let mut entry_count = 0;
         while let Some(path) = folders.pop() {
             let Ok(kind) = fs::symlink_metadata(&path).map(|found| found.file_type()) else {
                 continue;
@@ -65,11 +66,11 @@ impl Runtime {
                     });
                     hidden.links += 1;
                 }
-            } else if kind.is_dir() && seen < MAX_ENTRIES {
+            } else if kind.is_dir() && entry_count < MAX_ENTRIES {
                 let children = fs::read_dir(&path).into_iter().flatten().flatten();
                 let before = folders.len();
                 folders.extend(children.map(|child| child.path()));
-                seen += folders.len() - before;
+                entry_count += folders.len() - before;
             }
         }
         let mut found: Vec<_> = found.into_values().collect();
@@ -90,7 +91,8 @@ impl Runtime {
                 }
                 continue;
             }
-            // The bundle may set PATH: it must not ask for other files of the host.
+            // The bundle may set PATH. Only folders that agents see are examined below, or the message would reveal other files of the
+            // host.
             let Ok(folder) = fs::canonicalize(folder) else {
                 continue;
             };

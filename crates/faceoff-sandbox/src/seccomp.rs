@@ -16,7 +16,7 @@ use seccompiler::{
 };
 use std::collections::BTreeMap;
 
-/// Refused with any arguments. Each group states its reason.
+/// Not permitted (`EPERM`) with any arguments. Each group states its reason.
 const REFUSED: &[i64] = &[
     // other processes' memory and descriptors
     libc::SYS_ptrace,
@@ -215,32 +215,32 @@ pub(crate) struct Filters(Vec<BpfProgram>);
 type Rules = BTreeMap<i64, Vec<SeccompRule>>;
 
 impl Filters {
-    /// `has_own_network`: is the agent in a network namespace of its own? `refuse_affinity_changes`: also refuses to change the CPU affinity,
-    /// for hosts where no cpuset confines the agent.
+    /// `has_own_network`: is the agent in a network namespace of its own? `refuse_affinity_changes`: also refuses to change the CPU
+    /// affinity, for hosts where no cpuset confines the agent.
     pub(crate) fn build(
         has_own_network: bool,
         refuse_affinity_changes: bool,
     ) -> Result<Self, SandboxError> {
-        let mut rules = any_arguments(&[REFUSED, REFUSED_ON_THIS_ARCH]);
+        let mut not_permitted = any_arguments(&[REFUSED, REFUSED_ON_THIS_ARCH]);
         if refuse_affinity_changes {
-            rules.insert(libc::SYS_sched_setaffinity, Vec::new());
+            not_permitted.insert(libc::SYS_sched_setaffinity, Vec::new());
         }
-        rules.insert(libc::SYS_clone, namespace_rules()?);
+        not_permitted.insert(libc::SYS_clone, namespace_rules()?);
         // Local sockets reach nothing outside the sandbox, because no socket path of the host is mounted, and abstract names belong to the
         // network namespace.
         let not_unix = vec![rule([argument(0, SeccompCmpOp::Ne, libc::AF_UNIX)])?];
-        rules.insert(libc::SYS_socketpair, not_unix.clone());
+        not_permitted.insert(libc::SYS_socketpair, not_unix.clone());
         let sockets = if has_own_network {
             refused_sockets()?
         } else {
             not_unix
         };
-        rules.insert(libc::SYS_socket, sockets);
+        not_permitted.insert(libc::SYS_socket, sockets);
         // These requests push input into a terminal.
         let terminal = [libc::TIOCSTI, libc::TIOCLINUX].map(|request| request as libc::c_int);
-        rules.insert(libc::SYS_ioctl, one_of(1, &terminal)?);
+        not_permitted.insert(libc::SYS_ioctl, one_of(1, &terminal)?);
         // The kernel counts pages of pipes per user, and agents of an unprivileged service share one user.
-        rules.insert(libc::SYS_fcntl, one_of(1, &[libc::F_SETPIPE_SZ])?);
+        not_permitted.insert(libc::SYS_fcntl, one_of(1, &[libc::F_SETPIPE_SZ])?);
 
         let mut ignored = any_arguments(&[IGNORED]);
         ignored.insert(libc::SYS_madvise, one_of(2, &IGNORED_ADVICE)?);
@@ -306,7 +306,7 @@ impl Filters {
             compile(unknown_ioctls, libc::ENOTTY)?,
             compile(unsupported_flags, libc::EOPNOTSUPP)?,
             // Last, because it refuses `seccomp` itself.
-            compile(rules, libc::EPERM)?,
+            compile(not_permitted, libc::EPERM)?,
         ]))
     }
 
@@ -322,9 +322,10 @@ fn any_arguments(lists: &[&[i64]]) -> Rules {
     calls.map(|&call| (call, Vec::new())).collect()
 }
 
-/// The filter that passes calls to the service, which answers them ([`crate::answered_calls`]). `renumbers_cpus`: those about affinities, too.
+/// The filter that passes calls to the service, which answers them ([`crate::answered_calls`]). `renumbers_cpus`: the agent sees its CPUs
+/// numbered from 0, so calls about CPU affinity are passed, too.
 pub(crate) fn answered_calls(renumbers_cpus: bool) -> Result<BpfProgram, SandboxError> {
-    // The compiler has no such answer, so its answer of another kind is replaced.
+    // The filter compiler cannot express "ask the service", so it is given an unused error number, which is then replaced.
     const PLACEHOLDER: u32 = 4095;
     let affinity: &[i64] = if renumbers_cpus { AFFINITY } else { &[] };
     let mut rules = any_arguments(&[ANSWERED, affinity]);
@@ -339,13 +340,14 @@ pub(crate) fn answered_calls(renumbers_cpus: bool) -> Result<BpfProgram, Sandbox
     Ok(program)
 }
 
-/// Calls that the service answers.
+/// Calls that the service answers in the kernel's place, because the kernel's answer would show numbers of the host or a filter cannot
+/// decide.
 const ANSWERED: &[i64] = &[
     libc::SYS_statfs,
     libc::SYS_fstatfs,
     libc::SYS_sysinfo,
     libc::SYS_setsid,
-    // whether the file is the agent's own is not in the arguments
+    // locks are allowed on the agent's own files only, and the arguments do not show whose file it is
     libc::SYS_flock,
     // a connection within the agent's network makes a further socket
     libc::SYS_connect,
@@ -453,9 +455,9 @@ fn rule<const N: usize>(
 
 /// Answers `ENOSYS` to `clone3` and to every number above [`NEWEST_KNOWN`], including the x32 calls (bit 30).
 ///
-/// `prctl(PR_SET_PDEATHSIG)` succeeds without effect: the sandbox's first process ends with the service by this signal, and an agent without
-/// namespaces could otherwise outlive it. The call must not fail, because libraries use it for their own children, which end with the
-/// agent in any case.
+/// `prctl(PR_SET_PDEATHSIG)` succeeds without effect: the sandbox's first process ends with the service by this signal, and an agent
+/// without namespaces could otherwise outlive it. The call must not fail, because libraries use it for their own children, which end with
+/// the agent in any case.
 ///
 /// The other filters refuse foreign architectures, so this one does not check the architecture.
 fn filter_unknown_calls() -> BpfProgram {

@@ -1,4 +1,4 @@
-//! Numbers of sessions, which the kernel counts for the whole host.
+//! Numbers of sessions (the process sessions that `setsid` starts), which the kernel counts for the whole host.
 //!
 //! A new session gets a scheduling group with the next number, which `/proc/self/autogroup` shows. An agent could count to a value that a
 //! later agent reads. So an agent may start few sessions, and after its end a random number of them is skipped, up to many times its own.
@@ -20,6 +20,7 @@ const MAX_SKIPPED_PER_SESSION: u32 = 16;
 pub(crate) struct SessionBudget {
     /// Number of sessions started.
     pub started: u32,
+    /// Number of sessions that may be started now; it grows with time, so it has a fractional part.
     available: f64,
     updated_at: Instant,
 }

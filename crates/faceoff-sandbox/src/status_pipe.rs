@@ -105,7 +105,7 @@ mod tests {
     use rustix::io::write;
 
     #[test]
-    fn any_stated_exit_code_is_the_agents() {
+    fn exit_code_of_any_value_is_read() {
         for code in [0, 137, -6, 4096] {
             let (mut status, writer) = StatusPipe::new().unwrap();
             let text = format!("{{ \"child-pid\": 77 }}\n{{ \"exit-code\": {code} }}\n");

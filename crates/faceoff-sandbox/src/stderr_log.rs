@@ -37,7 +37,7 @@ pub(crate) struct StderrLog {
     thread: Option<JoinHandle<()>>,
     /// Closed by the thread at its end.
     ended: mpsc::Receiver<()>,
-    /// Dropped to stop the thread even if a process still has the agent's end open.
+    /// Dropped to stop the thread even if a process still has the writing end of the log open.
     stop: Option<OwnedFd>,
 }
 
@@ -105,7 +105,8 @@ fn lock(kept: &Mutex<BoundedLog>) -> MutexGuard<'_, BoundedLog> {
 fn drain_until_closed(log: &OwnedFd, stop: &OwnedFd, kept: &Mutex<BoundedLog>) {
     let mut chunk = vec![0; CHUNK_BYTES];
     let keep = |bytes: &[u8]| lock(kept).push(bytes);
-    // Larger than what a pipe can hold after its writers have died. If a writer survives and goes on writing, reading ends here.
+    // More than a pipe can hold, so a log whose writers have died is read completely. If a writer survives, reading ends after this many
+    // bytes.
     let mut remaining_bytes_after_stop = 1 << 20;
     loop {
         let mut fds = [

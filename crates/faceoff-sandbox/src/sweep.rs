@@ -1,4 +1,4 @@
-//! Removes the remains of a killed service.
+//! Removes the remains of a killed service: of a process that started agents and could not clean up after them.
 
 use crate::{
     cgroup,

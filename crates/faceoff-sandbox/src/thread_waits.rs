@@ -11,9 +11,10 @@ use std::{
     time::Duration,
 };
 
-/// State of each tracked thread at one time.
+/// One sample of the tracked threads: how long each has waited for a CPU so far, and whether it waits now.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct ThreadWaits {
+    /// By thread id.
     threads: BTreeMap<u32, ThreadState>,
 }
 
@@ -69,16 +70,16 @@ impl ThreadWaits {
 /// The waits of each thread that could have delayed an answer, updated by samples while the answer is late. If a thread got the CPU,
 /// went to sleep and did not answer, its earlier waits do not count.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct WaitLedger(BTreeMap<u32, Account>);
+pub(crate) struct WaitLedger(BTreeMap<u32, LedgerEntry>);
 
 #[derive(Debug, Clone, Copy, Default)]
-struct Account {
+struct LedgerEntry {
     /// The part of its wait counter that does not count: its value when the thread was last found to have finished its
     /// work, and zero before.
     discarded_wait: Duration,
     /// Time between successive samples that both found it waiting.
     observed_wait: Duration,
-    /// Its number of time slices at the last of these samples.
+    /// The thread's number of time slices at the last sample that found it waiting.
     time_slices: u64,
     /// Was it asleep in the last sample?
     was_asleep: bool,
@@ -105,43 +106,44 @@ impl WaitLedger {
         idle_between: Duration,
     ) {
         for (id, thread) in &now.threads {
-            let account = self.0.entry(*id).or_default();
+            let entry = self.0.entry(*id).or_default();
             let earlier = previous.threads.get(id);
             // If it had slept in between, waking up would have cost a time slice.
             if earlier.is_some_and(|earlier| {
                 earlier.is_runnable && earlier.time_slices == thread.time_slices
             }) && thread.is_runnable
             {
-                account.observed_wait += idle_between;
-                account.time_slices = thread.time_slices;
+                entry.observed_wait += idle_between;
+                entry.time_slices = thread.time_slices;
             }
-            account.update(thread);
+            entry.update(thread);
         }
     }
 
-    /// Starts with the first sample. `stolen`: steal time since the baseline before the question. A runnable thread
-    /// without a time slice since then may have slept in between, so at most the steal time counts as its wait.
-    pub(crate) fn begin(&mut self, baseline: &ThreadWaits, now: &ThreadWaits, stolen: Duration) {
+    /// Starts with the first sample, `now`. `before`: the counters that were read before the question. `stolen`: steal time since then, in
+    /// which the hypervisor had stopped the agent's CPUs. A runnable thread without a time slice since then may have slept in between, so
+    /// at most the steal time counts as its wait.
+    pub(crate) fn begin(&mut self, before: &ThreadWaits, now: &ThreadWaits, stolen: Duration) {
         for (id, thread) in &now.threads {
-            let account = self.0.entry(*id).or_default();
-            let earlier = baseline.threads.get(id);
+            let entry = self.0.entry(*id).or_default();
+            let earlier = before.threads.get(id);
             if thread.is_runnable
                 && earlier.is_some_and(|earlier| earlier.time_slices == thread.time_slices)
             {
-                account.observed_wait += stolen;
-                account.time_slices = thread.time_slices;
+                entry.observed_wait += stolen;
+                entry.time_slices = thread.time_slices;
             }
-            account.update(thread);
+            entry.update(thread);
         }
     }
 
     /// The longest observed wait of a single thread.
     pub(crate) fn longest_observed_wait(&self, now: &ThreadWaits, answer: AnswerState) -> Duration {
-        let each = self.0.iter().filter_map(|(id, account)| {
+        let each = self.0.iter().filter_map(|(id, entry)| {
             let thread = now.threads.get(id)?;
-            let ran_since = thread.time_slices != account.time_slices;
+            let ran_since = thread.time_slices != entry.time_slices;
             (!thread.is_background && (ran_since || answer == AnswerState::Pending))
-                .then_some(account.observed_wait)
+                .then_some(entry.observed_wait)
         });
         each.max().unwrap_or_default()
     }
@@ -149,11 +151,11 @@ impl WaitLedger {
     fn discarded_wait(&self, id: u32) -> Duration {
         self.0
             .get(&id)
-            .map_or(Duration::ZERO, |account| account.discarded_wait)
+            .map_or(Duration::ZERO, |entry| entry.discarded_wait)
     }
 }
 
-impl Account {
+impl LedgerEntry {
     /// Two successive samples that find it asleep show that it has finished its work; earlier waits no longer count.
     fn update(&mut self, thread: &ThreadState) {
         let is_asleep = !thread.is_runnable;
@@ -166,17 +168,17 @@ impl Account {
 }
 
 impl ThreadWaits {
-    /// The longest countable wait of a thread since `baseline`, which was `wall` ago.
+    /// The longest countable wait of a thread since the sample `earlier`, which was taken `elapsed` ago.
     pub(crate) fn longest_since(
         &self,
-        baseline: &Self,
-        wall: Duration,
+        earlier: &Self,
+        elapsed: Duration,
         ledger: &WaitLedger,
         answer: AnswerState,
     ) -> Duration {
         let countable_wait = |(id, now): (&u32, &ThreadState)| {
             // Nothing is known about a thread that was not tracked before.
-            let earlier = baseline.threads.get(id)?;
+            let earlier = earlier.threads.get(id)?;
             let counted_from = ledger.discarded_wait(*id).max(earlier.wait_time);
             if now.is_background {
                 return None;
@@ -186,12 +188,12 @@ impl ThreadWaits {
                 let is_waiting = now.is_runnable
                     && now.run_time == earlier.run_time
                     && counted_from == earlier.wait_time;
-                return (is_waiting && answer == AnswerState::Pending).then_some(wall);
+                return (is_waiting && answer == AnswerState::Pending).then_some(elapsed);
             }
             Some(now.wait_time.saturating_sub(counted_from))
         };
         let each = self.threads.iter().filter_map(countable_wait);
-        each.max().unwrap_or_default().min(wall)
+        each.max().unwrap_or_default().min(elapsed)
     }
 }
 

@@ -3,7 +3,7 @@
 
 use crate::{
     interval::wilson95,
-    paired::{PairedTally, PairingError},
+    paired_tests::{PairedTally, PairingError},
     summary::{EpisodeSummary, TaskSummary},
 };
 use faceoff_types::{Profile, ProfileMap, Task, TaskMap};
@@ -38,7 +38,8 @@ pub struct ProfileEffect {
 }
 
 /// Compares each profile with the ideal one, task by task, on paired episodes: the table of the ablation figure
-/// in the paper on the 2023 Robot Air Hockey Challenge. Profiles are in the order of `runs`; tasks without an ideal run are left out.
+/// in the paper on the 2023 Robot Air Hockey Challenge. `runs` has the agent's episodes under each profile, in whose order the result is.
+/// Tasks without episodes under the ideal profile are left out.
 ///
 /// The caller ensures that all runs have the same seed.
 ///

@@ -4,7 +4,7 @@
 use crate::{
     difference::{paired_difference, score_difference, unpaired_difference},
     evaluation::overall_score,
-    paired::{PairedTally, SIGNIFICANCE, overall_p_value},
+    paired_tests::{PairedTally, SIGNIFICANCE, overall_p_value},
     summary::EpisodeSummary,
 };
 use faceoff_types::{Profile, Seed, Task, TaskMap, TaskWeights, Variation, deprecated_names};
@@ -232,7 +232,7 @@ impl ComparedEvaluation<'_> {
         )
     }
 
-    /// Counts for each task the episodes that both, one or neither solved.
+    /// Counts for each task the episodes that both, one or neither solved, after checking that both evaluations have the same episodes.
     fn paired_tallies(&self, other: &Self) -> Result<TaskMap<PairedTally>, NotComparable> {
         if self.ruleset != other.ruleset {
             return Err(NotComparable::Ruleset(

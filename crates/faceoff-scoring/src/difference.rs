@@ -3,7 +3,7 @@
 //! They use the square-and-add method: the margin of a sum is the root of the summed squares of the margins of its parts
 //! (Newcombe, Statistics in Medicine 17, 1998; Zou and Donner, Statistics in Medicine 27, 2008).
 
-use crate::{evaluation::weight_percent, interval::wilson95, paired::PairedTally};
+use crate::{evaluation::weight_percent, interval::wilson95, paired_tests::PairedTally};
 use faceoff_types::{Task, TaskWeights};
 
 /// An estimate and its 95 % interval.
@@ -69,9 +69,10 @@ fn phi(tally: &PairedTally) -> f64 {
         return 0.0;
     }
     let product = both * neither - only_a * only_b;
-    let half = f64::from(tally.episodes()) / 2.0;
-    let shrunk = if product > half {
-        product - half
+    // Newcombe's continuity correction.
+    let correction = f64::from(tally.episodes()) / 2.0;
+    let shrunk = if product > correction {
+        product - correction
     } else {
         product.min(0.0)
     };
@@ -107,7 +108,7 @@ pub(crate) fn score_difference(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::paired::tests::tally;
+    use crate::paired_tests::tests::tally;
     use faceoff_airhockey::TASKS;
     use statrs::distribution::{Binomial, Discrete};
 

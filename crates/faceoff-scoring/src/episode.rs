@@ -64,8 +64,8 @@ pub fn episode_penalty(competition: &Competition, outcome: &EpisodeOutcome) -> f
     competition.violation_points(&outcome.violations) + time_or_fault_penalty(competition, outcome)
 }
 
-/// For each kind of violation in `names`, the number of episodes (or windows of a game) with it. Each is given by its violated limits, and
-/// whether its answers were late.
+/// For each kind of violation in `names`, the number of episodes (or windows of a game) with it. `episodes` has for each its violated
+/// limits, and whether it also counts as a violation of the computation time.
 pub(crate) fn violation_counts<'a>(
     names: impl Iterator<Item = ViolationName>,
     episodes: impl Iterator<Item = (&'a Violations, bool)>,

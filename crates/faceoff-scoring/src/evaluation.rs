@@ -13,8 +13,8 @@ pub(crate) fn weight_percent(weights: &TaskWeights, task: Task) -> f64 {
 
 /// The overall score in percent, from success rates as fractions. Missing tasks count as 0.
 ///
-/// The paper's text says "mean", but its qualifying table follows the weights of the ruleset. Rounding to nine decimals
-/// makes mathematically equal scores equal in floating point, so that the rules decide ties, not rounding errors.
+/// The text of the paper on the 2023 challenge says "mean", but its qualifying table follows the weights of the ruleset. Rounding to nine
+/// decimals makes mathematically equal scores equal in floating point, so that the rules decide ties, not rounding errors.
 #[must_use]
 pub fn overall_score(weights: &TaskWeights, rates: impl IntoIterator<Item = (Task, f64)>) -> f64 {
     let score: f64 = rates

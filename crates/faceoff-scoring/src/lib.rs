@@ -2,8 +2,8 @@
 //! and ratings. Both with intervals and tests of differences.
 //!
 //! An *outcome* is the result of one simulated episode. *Penalty points* are for violated safety limits and late answers; an
-//! agent's *tier* follows from them, if the competition has tiers. A *board* ranks evaluations, *standings* rank the teams of a tournament. "The paper" in this
-//! crate is the report on the robot air hockey competition of 2023, whose rules these are.
+//! agent's *tier* follows from them, if the competition has tiers. A *board* ranks evaluations, *standings* rank the teams of a
+//! tournament. "The paper" in this crate is the report on the robot air hockey competition of 2023, whose rules these are.
 //!
 //! All functions are pure: a stored recording can be scored again without a simulation, and anyone can check a
 //! published number. The rules are those of the rulesets of [`faceoff_types::Ruleset`]; `docs/rules.md` explains them.
@@ -21,8 +21,8 @@ mod difference;
 mod episode;
 mod evaluation;
 mod interval;
-mod mean;
-mod paired;
+mod mean_result;
+mod paired_tests;
 mod qualifying;
 mod random_numbers;
 mod rank_groups;
@@ -47,8 +47,8 @@ pub use episode::{
 };
 pub use evaluation::{overall_score, score_evaluation};
 pub use interval::{wilson95, wilson95_of_rate};
-pub use mean::{joined_summary, mean_result};
-pub use paired::{PairedTally, PairingError, SIGNIFICANCE, overall_p_value};
+pub use mean_result::{joined_summary, mean_result};
+pub use paired_tests::{PairedTally, PairingError, SIGNIFICANCE, overall_p_value};
 pub use qualifying::{
     InvalidTaskScore, InvalidTasks, QUALIFYING_EPISODES, QualifyingRow, QualifyingScores, TaskRow,
     TaskScore,

@@ -22,8 +22,8 @@ pub struct TaskScore {
     episodes: u32,
 }
 
-/// A task's entry in the file, not validated. Derived fields of `results.json` are allowed and ignored, so that its
-/// `tasks` can be copied unchanged.
+/// A task's entry in the file, not validated. The other fields that `results.json`, the result of an evaluation, has for a task are allowed
+/// and ignored, so that its `tasks` can be copied unchanged.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawTaskScore {

@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn memory_is_a_hundredth_of_times() {
+    fn only_the_largest_hundredth_of_times_is_stored() {
         let mut times = StepTimes::for_steps(1_000_000);
         for index in 0..1_000_000u32 {
             // 7919 is a prime: the times 0 to 7918 repeat without a pattern that fits 1,000,000.

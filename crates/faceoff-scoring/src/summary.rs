@@ -2,7 +2,7 @@
 
 use crate::{
     episode::{episode_penalty, has_fault},
-    paired::PairingError,
+    paired_tests::PairingError,
     successes::Successes,
     tier_change::TierChange,
 };

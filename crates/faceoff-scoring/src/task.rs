@@ -13,7 +13,7 @@ use faceoff_types::{Competition, EpisodeOutcome, TaskResult, TierBounds};
 /// `step_times` are the computation times of all answered steps in the sequence of the episodes. The result then does not
 /// depend on how the episodes were divided into jobs.
 ///
-/// An episode that ended with an agent fault is a failure and counts as a violation of the computation time.
+/// An episode that ended with an agent fault is a failure and counts as a violation of the computation time, with its highest penalty.
 ///
 /// # Panics
 /// If `step_times` has more or fewer times than expected.

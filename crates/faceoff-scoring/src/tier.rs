@@ -1,5 +1,6 @@
-//! Tiers: how safe an agent is, by its *deployability score*, the sum of its penalty points. An agent is deployable,
-//! improvable or non-deployable; the bounds grow with the number of episodes or, in a game, of windows of 500 control steps.
+//! Tiers: how safe an agent is, by its *deployability score*, the sum of its penalty points in one task or game. An agent is deployable,
+//! improvable or non-deployable; the bounds grow with the number of episodes or, in a game, of windows of 500 control steps. Over several
+//! tasks the largest score and the worst tier count, not a sum.
 
 use faceoff_types::{Millionths, Tier, TierBounds};
 

@@ -1,7 +1,7 @@
 //! Cached public responses, valid until the season changes and for one second at most. Without it, many visitors of a board
 //! would take CPU time from the agents that run on the same machine.
 
-use crate::{accept, problem::Problem, shared_cache::SharedCache};
+use crate::{content_negotiation, problem::Problem, shared_cache::SharedCache};
 use axum::{
     body::{self, Body, Bytes},
     extract::Request,
@@ -63,7 +63,7 @@ pub struct CachedResponse {
     status: StatusCode,
     headers: HeaderMap,
     body: Bytes,
-    /// Marks for outer layers.
+    /// Values that the handler attached to the response for the layers around it, such as that of the security headers.
     extensions: Extensions,
 }
 
@@ -147,9 +147,9 @@ pub fn cache_key(request: &mut Request, store: &Store, second: i64) -> Option<An
     }
     let key = AnswerKey {
         uri,
-        wants_page: accept::wants_page(headers),
-        wants_csv: accept::wants_csv(headers),
-        accepts_gzip: accept::accepts_gzip(headers),
+        wants_page: content_negotiation::wants_page(headers),
+        wants_csv: content_negotiation::wants_csv(headers),
+        accepts_gzip: content_negotiation::accepts_gzip(headers),
         changes: store.change_count(),
         second,
     };

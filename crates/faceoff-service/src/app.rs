@@ -179,10 +179,10 @@ impl AppState {
             .await
     }
 
-    /// Whose request it is, as far as this is known without reading the database: a token that was not verified recently counts as a
-    /// visitor's. This gives no rights.
+    /// The priority of a request under overload. It gives no rights, so it is found without reading the database: a request with a token
+    /// that was not verified recently counts as a visitor's.
     pub fn precedence(&self, headers: &HeaderMap) -> Precedence {
-        // The grant of a job: a remote worker transfers files of an evaluation.
+        // With the grant of a job a remote worker transfers the files of that job.
         if let Some(sealed) = credential::sealed_grant(headers)
             && Grant::open(sealed, &self.config.link_key.grant_key()).is_some()
         {

@@ -86,7 +86,7 @@ impl Caller {
         )
     }
 
-    /// Before whom the caller has a place under overload.
+    /// The caller's priority under overload.
     pub const fn precedence(&self) -> Precedence {
         if self.is_organiser() {
             Precedence::Organiser
@@ -257,11 +257,11 @@ async fn authenticate(parts: &Parts, app: &App) -> Result<Option<Caller>, Proble
     // The time of a look-up by hash may depend on the hash. That is safe: a token whose hash shares a prefix with
     // another one cannot be chosen.
     let secret_hash = hash_token(token);
-    let known = parts.extensions.get::<SessionCaller>();
+    let session = parts.extensions.get::<SessionCaller>();
     // The secret of a session is no API token: in the header `Authorization` it is not valid.
-    let known =
-        known.filter(|known| kind == TokenKind::Session && known.0.secret_hash == secret_hash);
-    let verified = match known {
+    let session = session
+        .filter(|session| kind == TokenKind::Session && session.0.secret_hash == secret_hash);
+    let verified = match session {
         Some(SessionCaller(caller)) => Ok(VerifiedToken {
             token: caller.token.clone(),
             principal: caller.principal.clone(),

@@ -35,18 +35,19 @@ pub struct ListedDownload {
 #[derive(Debug, Default)]
 pub struct Downloads {
     offered: Vec<Download>,
-    listed: Mutex<Listed>,
+    listed: Mutex<HashedDownloads>,
 }
 
+/// The list with sizes and hashes, as last computed.
 #[derive(Debug, Default)]
-struct Listed {
+struct HashedDownloads {
     /// Size and time of each file when it was read.
-    versions: Vec<Option<Version>>,
+    versions: Vec<Option<FileVersion>>,
     downloads: Arc<[ListedDownload]>,
 }
 
-/// Size in bytes and time of the last change.
-type Version = (u64, Option<SystemTime>);
+/// Size of a file in bytes, and time of its last change.
+type FileVersion = (u64, Option<SystemTime>);
 
 impl Downloads {
     /// Offers these files.
@@ -61,12 +62,12 @@ impl Downloads {
     pub async fn list(&self) -> Arc<[ListedDownload]> {
         let mut listed = self.listed.lock().await;
         let offered = self.offered.clone();
-        let known = std::mem::take(&mut listed.versions);
-        let current = Arc::clone(&listed.downloads);
+        let known_versions = std::mem::take(&mut listed.versions);
+        let known_downloads = Arc::clone(&listed.downloads);
         let read = tokio::task::spawn_blocking(move || {
             let versions: Vec<_> = offered.iter().map(Download::version).collect();
-            if versions == known {
-                return (versions, current);
+            if versions == known_versions {
+                return (versions, known_downloads);
             }
             let downloads = offered.into_iter().filter_map(|download| {
                 let name = download.name.clone();
@@ -77,7 +78,7 @@ impl Downloads {
             (versions, downloads.collect())
         });
         if let Ok((versions, downloads)) = read.await {
-            *listed = Listed {
+            *listed = HashedDownloads {
                 versions,
                 downloads,
             };
@@ -87,8 +88,8 @@ impl Downloads {
 }
 
 impl Download {
-    /// `None`: it has none, because it is in memory, or there is no file.
-    fn version(&self) -> Option<Version> {
+    /// The version of the file; `None` for content in memory, and for a file that is missing.
+    fn version(&self) -> Option<FileVersion> {
         let DownloadContent::File(path) = &self.content else {
             return None;
         };

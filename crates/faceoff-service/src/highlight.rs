@@ -1,4 +1,5 @@
-//! The highlight of an evaluation, as the cache in the state of all request handlers holds it.
+//! The highlight of an evaluation: its quickest successful episode in the task with the largest weight, which the board's page plays.
+//! Here is its data, which the state of the request handlers caches; `views::highlight` finds it.
 
 use faceoff_replay::Clip;
 use faceoff_types::Task;

@@ -1,5 +1,5 @@
-//! Which partial uploads are being received. A newer connection takes a partial upload over, because the server may not know yet that
-//! an older one is broken.
+//! Locks of partial uploads. A *partial upload* is a bundle that a team sends in several requests. Only one connection may write to its
+//! file. A newer connection takes the file over, because the server may not know yet that an older one is broken.
 
 use std::{
     collections::HashMap,
@@ -14,6 +14,7 @@ pub struct PartialUploads {
     receivers: Mutex<HashMap<String, Receiver>>,
 }
 
+/// The connections that send parts of one partial upload.
 #[derive(Debug)]
 struct Receiver {
     /// Locked by the connection that may write to the file.
@@ -40,6 +41,7 @@ pub struct PartialUploadLock {
     name: String,
     /// Cancelled once a newer connection wants the file.
     pub taken_over: CancellationToken,
+    /// `None` while an older connection still has the file.
     guard: Option<OwnedMutexGuard<()>>,
 }
 

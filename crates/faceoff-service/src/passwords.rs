@@ -363,7 +363,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn unknown_name_has_the_same_answers() {
+    async fn unknown_name_gets_the_same_answers_as_a_known_one() {
         let passwords = Passwords::default();
         let account = || Some((UserId::new(), "$argon2id$".to_owned()));
         let mut answers = Vec::new();
@@ -399,7 +399,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn client_has_few_places_and_leaves_others_theirs() {
+    async fn client_cannot_fill_the_queue_for_password_hashes() {
         let passwords = Passwords::default();
         let places: Vec<_> = (0..MAX_WAITING_PER_CLIENT)
             .map(|_| {

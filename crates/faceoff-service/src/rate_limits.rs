@@ -28,8 +28,8 @@ pub struct RateLimit {
 /// The rate limits of the server; `None`: unlimited.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct RateLimits {
-    /// Per IPv4 address or IPv6 network of 64 bits, and as much for each caller there whose token was verified recently: the students of a
-    /// class may share an address. The address of a trusted proxy is not limited.
+    /// For each IPv4 address or IPv6 network of 64 bits. Callers whose tokens were verified recently have this limit each for themselves:
+    /// the students of a class may share an address. The address of a trusted proxy is not limited.
     pub address: Option<RateLimit>,
     /// Per token or session, from any address.
     pub token: Option<RateLimit>,

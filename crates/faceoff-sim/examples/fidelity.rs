@@ -1,6 +1,5 @@
-//! Draws the differences between the simulator and recordings of the *reference* (the simulator of the 2023 Robot Air Hockey Challenge):
-//! the figures of
-//! `docs/simulator.md`. A *replay* is a simulated episode with the recorded actions. A *contact* of the puck is
+//! Draws the figures of `docs/simulator.md`: the differences between the simulator and recordings of the *reference* (the simulator of the
+//! 2023 Robot Air Hockey Challenge). A *replay* is a simulated episode with the recorded actions. A *contact* of the puck is
 //! a *bounce* off a rim or an *impact* of a mallet.
 //!
 //! `cargo run -p faceoff-sim --example fidelity -- docs/images/fidelity`

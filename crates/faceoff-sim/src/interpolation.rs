@@ -155,7 +155,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn interpolation_codes_are_seven() {
+    fn protocol_has_seven_interpolation_codes() {
         // The seventh is null.
         let known: Vec<i64> = (-300..300)
             .filter(|code| Interpolation::from_code(Some(*code)).is_ok())

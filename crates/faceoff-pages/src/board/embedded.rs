@@ -56,7 +56,7 @@ pub(crate) async fn page(State(app): State<App>) -> Result<Response, PageProblem
         style: assets::FRONT_STYLE.url(),
         title: competition.title.clone(),
         stage: board.stage_name.to_string(),
-        is_hidden: visibility.is_hidden(board.stage),
+        is_hidden: visibility.hides_scores(board.stage),
         groups,
         omitted: board.rows.len().saturating_sub(MAX_TEAMS),
     })?;

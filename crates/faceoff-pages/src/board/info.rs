@@ -87,7 +87,7 @@ impl BoardInfo {
         address: &Address<'_>,
         paused: Option<DecisionView>,
     ) -> Result<Self, PageProblem> {
-        let is_hidden = visibility.is_hidden(board.stage);
+        let is_hidden = visibility.hides_scores(board.stage);
         let stages = stage::all(app).await?;
         let mut other_boards = Vec::new();
         let mut info = None;

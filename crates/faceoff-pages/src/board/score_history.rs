@@ -39,7 +39,7 @@ impl ScoreHistory {
         (day, is_live): (Option<Date>, bool),
     ) -> Result<Self, Problem> {
         let mut score_history = Self::default();
-        let Some(day) = day.filter(|_| !visibility.is_hidden(board.stage)) else {
+        let Some(day) = day.filter(|_| !visibility.hides_scores(board.stage)) else {
             return Ok(score_history);
         };
         let frozen = board.frozen.as_ref().filter(|_| !is_live);

@@ -61,7 +61,7 @@ async fn load(app: &App, query: BoardPageQuery, task: Option<Task>) -> Result<Ca
     };
     let style = text_style(Weight::Semibold, 54.0, "ink");
     card.text(&title, &style, [LEFT, 182.0], RIGHT - LEFT);
-    let note = match (visibility.is_hidden(board.stage), board.rows.is_empty()) {
+    let note = match (visibility.hides_scores(board.stage), board.rows.is_empty()) {
         (true, _) => Some("The results are hidden until the organisers reveal them."),
         (false, true) => Some("No team has a result yet."),
         (false, false) => None,

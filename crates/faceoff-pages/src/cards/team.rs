@@ -43,7 +43,7 @@ async fn load(app: &App, id: TeamId, query: TeamPageQuery) -> Result<Card, PageP
     let mut rows = history.rows.iter();
     let Some(latest) = rows.rfind(|row| row.team_id == id) else {
         card.title(team.name.as_str(), history.stage_name.as_str());
-        let note = match visibility.is_hidden(history.stage) {
+        let note = match visibility.hides_scores(history.stage) {
             true => "The results are hidden until the organisers reveal them.",
             false => "No result yet.",
         };

@@ -110,7 +110,7 @@ fn assert_calls_return(kind: &str, calls: Vec<Call>, end: End) {
     assert_eq!(expect_line(&mut agent), "ready");
     let killer = agent.killer().unwrap();
     let (sender, ended) = mpsc::channel();
-    let slot = thread::spawn(move || {
+    let evaluator_thread = thread::spawn(move || {
         for call in calls {
             perform(call, &mut agent);
         }
@@ -125,7 +125,7 @@ fn assert_calls_return(kind: &str, calls: Vec<Call>, end: End) {
         killer.kill();
         panic!("{kind} blocked the evaluator");
     }
-    slot.join().unwrap();
+    evaluator_thread.join().unwrap();
     subject.assert_nothing_left();
 }
 
@@ -191,7 +191,7 @@ fn frozen_agent_uses_no_time_and_then_continues() {
         println!("this test checks nothing on this host: it has no usable freezer");
         return;
     }
-    // A thread freezes when it next leaves the kernel.
+    // A thread freezes only when it next leaves the kernel, so wait until the CPU time stands still.
     let cpu_time = |agent: &AgentProcess| agent.cpu_time_s().unwrap();
     let mut before = cpu_time(&agent);
     loop {

@@ -87,6 +87,7 @@ fn assert_no_traces(mut found: Answers) {
     {
         assert_eq!(found.remove(call).as_deref(), Some("ok"), "{call}");
     }
+    // What the test agent finds of terminals, settings, message queues and files that others may have left.
     for (name, answer) in [
         ("new_terminal", "ENOENT"),
         ("host_settings", ""),
@@ -209,7 +210,8 @@ fn ordinary_python_libraries_work() {
     assert!(answers.len() >= 15, "{answers:?}");
 }
 
-/// The test agent tries to open the ends of its channel by every path in `/proc`, and to change their buffer sizes.
+/// The test agent tries to open the ends of its channel by every path in `/proc` (a socket cannot be opened by a path: `ENXIO`), and to
+/// change their buffer sizes.
 #[test]
 fn channel_ends_cannot_be_reopened_or_shrunk() {
     let report = Subject::new("reopens_channel", &[]).report();

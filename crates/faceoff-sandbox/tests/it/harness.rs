@@ -58,6 +58,7 @@ impl Drop for SerialGuard {
 pub struct Subject {
     pub bundle: tempfile::TempDir,
     pub spec: SpawnSpec,
+    /// An argument of the agent's command, which its processes inherit; [`processes_marked`] finds them by it.
     pub mark: String,
     _guard: SerialGuard,
 }
@@ -199,21 +200,18 @@ pub fn missing_layers() -> &'static [Layer] {
     MISSING.get_or_init(|| {
         let missing: Vec<_> = probe_host()
             .into_iter()
-            .filter(|feature| !feature.available)
+            .filter(|probe| !probe.available)
             .collect();
-        for feature in &missing {
+        for probe in &missing {
             let may_be_missing = !is_root()
                 && matches!(
-                    feature.layer,
+                    probe.layer,
                     Layer::CgroupMemory | Layer::CgroupPids | Layer::CgroupCpu
                 );
-            assert!(may_be_missing, "this host should have {feature:?}");
-            println!(
-                "not tested on this host: {}: {}",
-                feature.layer, feature.found
-            );
+            assert!(may_be_missing, "this host should have {probe:?}");
+            println!("not tested on this host: {}: {}", probe.layer, probe.found);
         }
-        missing.into_iter().map(|feature| feature.layer).collect()
+        missing.into_iter().map(|probe| probe.layer).collect()
     })
 }
 

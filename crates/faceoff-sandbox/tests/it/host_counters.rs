@@ -81,8 +81,8 @@ impl HostActivity {
     }
 }
 
-/// A team's agent learns something, and sends each of 200 bits by all means at once: another team's agent reads the same values in all
-/// cases.
+/// One agent tries to send 200 random bits to another one. For a 1 it changes all counters that it can, and the host is busy; for a 0
+/// neither happens. The other agent reads the same values in all cases.
 #[test]
 fn agent_readings_do_not_depend_on_host_activity() {
     const BITS: usize = 200;
@@ -180,18 +180,14 @@ fn refused_calls_have_the_errors_of_older_kernels() {
     assert_eq!(found["statfs /agent"][0], 0);
 }
 
-/// Without the layers the same agents can signal, so that the tests above can fail.
+/// Control: without the seccomp filter the same agents can signal to each other, so the tests above are able to fail.
 #[test]
-fn without_layers_agents_can_signal() {
-    let without = |layer| {
-        let mut subject = Subject::new("host_counters", &[]);
-        let Isolation::Sandboxed { disabled_layers } = &mut subject.spec.isolation else {
-            unreachable!()
-        };
-        disabled_layers.push(layer);
-        subject
+fn without_seccomp_agents_can_signal_to_each_other() {
+    let mut subject = Subject::new("host_counters", &[]);
+    let Isolation::Sandboxed { disabled_layers } = &mut subject.spec.isolation else {
+        unreachable!()
     };
-    let subject = without(Layer::Seccomp);
+    disabled_layers.push(Layer::Seccomp);
     let mut agent = subject.spawn();
     let before = read(&mut agent);
     let _host_activity = HostActivity::start(subject.bundle.path().parent().unwrap());
@@ -201,7 +197,7 @@ fn without_layers_agents_can_signal() {
     for name in ["sysinfo", "socket_cookie", "memfd_create"] {
         assert!(moved.contains(&name), "{name}: {moved:?}");
     }
-    // Only the network's own files: another layer closes them.
+    // The files of `/proc/net` stay closed: the network namespace does that, not the filter. The text of `dev` is reported as a hash.
     if is_root() {
         assert!(!moved.contains(&"network_files"), "{moved:?}");
         let closed = &before["network_files"];
@@ -211,9 +207,10 @@ fn without_layers_agents_can_signal() {
     }
 }
 
-/// An agent counts sessions up, or not, and a later agent guesses which from the number of its own.
+/// To send a 1, an agent starts many process sessions (`setsid`), which the kernel numbers for the whole host. A later agent guesses the
+/// bit from the number of its own session.
 #[test]
-fn session_numbers_tell_a_later_agent_nothing() {
+fn session_numbers_carry_no_message_to_a_later_agent() {
     const BITS: usize = 40;
     let sender = Subject::new("host_counters", &[]);
     let receiver = Subject::new("host_counters", &[]);
@@ -260,7 +257,7 @@ fn subprocess_in_a_session_of_its_own_works() {
 }
 
 #[test]
-fn users_are_not_numbered_in_order() {
+fn user_ids_of_successive_agents_are_not_in_order() {
     if !is_root() {
         return;
     }

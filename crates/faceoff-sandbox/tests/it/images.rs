@@ -82,6 +82,7 @@ impl ImageRoot {
     }
 }
 
+/// The text of the platform fault with which the start was refused.
 fn refusal(spawned: Result<AgentProcess, SpawnError>) -> String {
     match spawned {
         Err(SpawnError::Platform(error)) => error.to_string(),
@@ -210,7 +211,7 @@ fn image_has_the_limits_of_any_agent() {
     let mut agent = subject.spawn();
     assert_eq!(expect_line(&mut agent), "full");
     subject.finish(agent);
-    // The agent is the only process beside the sandbox's first one, without network and without rights.
+    // The agent is the only process beside the sandbox's first one. It has no capabilities, and its only network interface is `lo`.
     let output = root.output(
         "echo $$; echo /proc/[0-9]*; while read -r a b; do case $a in CapEff:|CapBnd:|NoNewPrivs:|Seccomp:) \
          echo $a $b;; esac; done < /proc/self/status\n\

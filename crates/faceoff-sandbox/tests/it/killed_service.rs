@@ -1,4 +1,5 @@
-//! When a service is killed, its agents die with it, and the next service removes the remains.
+//! When a service (here a child process of the test that starts agents) is killed, its agents die with it, and the next service removes the
+//! remains.
 
 use crate::harness::{Subject, TIMEOUT, agent_cgroups, expect_line, processes_marked};
 use faceoff_sandbox::{AgentProcess, sweep_stale};
@@ -22,8 +23,8 @@ fn agent_of_a_killed_service_dies_with_its_cgroup() {
     assert_ends_with_its_service("killed_service::service_waits_with_an_agent", false);
 }
 
-/// Kills the service that the ignored test `service` runs, and checks that its agent ends. `needs_sweep`: only the sweep of the next
-/// service ends it.
+/// Starts the ignored test `service` in a child process, kills it, and checks that its agent ends. `needs_sweep`: the agent ends only by
+/// the sweep that the next service makes at its start.
 fn assert_ends_with_its_service(service: &str, needs_sweep: bool) {
     let mut service = Command::new(std::env::current_exe().unwrap())
         .args(["--exact", service, "--ignored", "--nocapture"])
@@ -74,13 +75,13 @@ fn assert_ends_with_its_service(service: &str, needs_sweep: bool) {
 }
 
 #[test]
-#[ignore = "the service that the test above starts and kills"]
+#[ignore = "no test: the service that a test above starts and kills"]
 fn service_waits_with_an_agent() {
     run_service(|_| {});
 }
 
 #[test]
-#[ignore = "the service that a test above starts and kills"]
+#[ignore = "no test: the service that a test above starts and kills"]
 fn service_waits_with_a_frozen_agent() {
     run_service(|agent| {
         // Without a freezer the test checks an unfrozen agent.

@@ -82,7 +82,7 @@ fn network_namespace_isolates_without_the_filter() {
 }
 
 #[test]
-fn attempts_succeed_without_the_sandbox() {
+fn connections_succeed_without_the_sandbox() {
     use faceoff_sandbox::Isolation;
     let tcp = TcpListener::bind("127.0.0.1:0").unwrap();
     let port = tcp.local_addr().unwrap().port().to_string();

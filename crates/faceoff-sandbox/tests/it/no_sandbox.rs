@@ -1,4 +1,4 @@
-//! `--no-sandbox`: a developer's own agent.
+//! Agents without a sandbox, as a developer runs the own agent with the option `--no-sandbox`.
 
 use crate::harness::{LINE_CAP, Subject, TIMEOUT, expect_echo, expect_line};
 use faceoff_sandbox::{AgentProcess, Isolation, ReadLine, SpawnError};

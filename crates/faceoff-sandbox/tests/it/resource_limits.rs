@@ -59,7 +59,8 @@ fn child_over_the_memory_limit_dies_alone() {
     subject.assert_nothing_left();
 }
 
-/// The line that the test agent `exceeds_limits` prints: how much of the resource `kind` it got, and the error of the next request.
+/// The line that the test agent `exceeds_limits` prints: how much of the resource `kind` it got (MiB, or number of files), and the error of
+/// the next request.
 fn usage_line(kind: &str) -> String {
     let subject = Subject::new("exceeds_limits", &[kind]).with_limits(|limits| {
         limits.open_files = 40;
@@ -85,7 +86,7 @@ fn file_has_the_configured_maximum_size() {
 
 #[test]
 fn descriptors_are_limited_per_agent() {
-    // Three descriptors are open already.
+    // The limit is 40, and three descriptors are open already.
     assert_eq!(usage_line("descriptors"), "37 Too many open files");
 }
 

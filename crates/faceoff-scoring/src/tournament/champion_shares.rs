@@ -20,12 +20,12 @@ pub struct ChampionShare {
     pub share_ci95: [f64; 2],
 }
 
-/// The shares of all teams with at least one first place, largest first, then by name. `first_places` has one entry for each
-/// complete replay: its champion. The interval of a missing team is [`wilson95`](crate::wilson95) of 0 successes.
+/// The shares of all teams with at least one first place, largest first, then by name. `champions` has one entry for each
+/// complete replay of the tournament. The interval of a missing team is [`wilson95`](crate::wilson95) of 0 successes.
 #[must_use]
-pub fn compute_champion_shares(first_places: &[TeamName]) -> Vec<ChampionShare> {
+pub fn compute_champion_shares(champions: &[TeamName]) -> Vec<ChampionShare> {
     let mut counts = BTreeMap::<&TeamName, u32>::new();
-    for team in first_places {
+    for team in champions {
         *counts.entry(team).or_default() += 1;
     }
     let replays = counts.values().sum();

@@ -13,16 +13,16 @@ pub struct Departure {
     /// Withdrawn or disqualified.
     #[serde(rename = "as")]
     pub kind: DepartureKind,
-    /// The first round whose games with the team do not count: the current one or, between two rounds, the next; for a team that
-    /// withdraws the next one, if the rules say so. For a disqualified team an organiser may choose an earlier one; 1 excludes
-    /// all its games.
+    /// The first round whose games with the team do not count: the current one or, between two rounds, the next. Under rules by which a
+    /// team that withdraws still plays the current round, it is the round after. For a disqualified team an organiser may choose an earlier
+    /// round; 1 excludes all its games.
     pub from_round: RoundNumber,
 }
 
 /// All departures, at most one for each team.
 ///
-/// Games of earlier rounds count for both sides. If a departure takes effect in the middle of a round, all games with the team in
-/// it are excluded, including finished ones. Otherwise opponents that had already met it would have points that the others can no
+/// Games of earlier rounds count for both sides. If a departure takes effect in the middle of a round, all games of this round with the
+/// team are excluded, including finished ones. Otherwise opponents that had already met it would have points that the others can no
 /// longer get.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Departures(BTreeMap<TeamName, (DepartureKind, RoundNumber)>);

@@ -1,8 +1,8 @@
 //! A played game as in the file `games.json`: validation of the entry, and the game with its result.
 
-use super::points::MAX_EPISODE_PENALTY;
+use super::penalty_points::MAX_EPISODE_PENALTY;
 use super::{
-    result::{ForfeitKind, GameResult, ResultReason},
+    game_result::{ForfeitKind, GameResult, ResultReason},
     rules::{GameTally, final_score, forfeit_score, judge},
     side::Side,
     submission_label::SubmissionLabel,
@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 #[serde(try_from = "GameEntry")]
 pub struct PlayedGame {
     raw: GameEntry,
-    /// Final score `[home, away]` that counts, also after a forfeit.
+    /// Final score `[home, away]` that counts: as played, or after a forfeit by [`GameEntry::forfeit_score`].
     score: [u32; 2],
     result: GameResult,
 }
@@ -45,7 +45,7 @@ pub struct GameEntry {
     pub score: Option<[u32; 2]>,
     /// Penalty points of each team over the game.
     pub penalty_points: [f64; 2],
-    /// Length of the game in windows of 500 control steps; absent for the default.
+    /// Length of the game in windows of 500 control steps; absent: 90, a normal game.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub windows: Option<u32>,
     /// The limit that each side exceeded, if it forfeited.
@@ -248,12 +248,12 @@ impl TryFrom<GameEntry> for PlayedGame {
 }
 
 impl GameEntry {
-    /// The score, or the goals, that count if the game stood at `played`.
+    /// The score, or the goals, that count if the game stood at `played`: other numbers only after a forfeit.
     fn counted(&self, played: [u32; 2]) -> [u32; 2] {
         forfeit_score(self.forfeit_score, self.forfeit, played).unwrap_or(played)
     }
 
-    /// The final score before forfeits, or the reason why the entry is invalid.
+    /// Checks the entry. Returns the final score as played, without the rule for forfeits, or the reason why the entry is invalid.
     fn check(&self) -> Result<[u32; 2], String> {
         if let Err(error) = RoundNumber::try_from(self.round) {
             return Err(format!("round: {error}"));
@@ -296,7 +296,7 @@ impl GameEntry {
         self.final_score()
     }
 
-    /// The final score before forfeits, from goals and fouls or from `score`.
+    /// The final score as played, without the rule for forfeits, from goals and fouls or from `score`.
     fn final_score(&self) -> Result<[u32; 2], String> {
         if !has_no_forfeit(&self.forfeit) {
             let fouls = self.fouls.ok_or(

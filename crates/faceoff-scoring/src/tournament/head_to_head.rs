@@ -15,7 +15,7 @@ pub struct HeadToHead {
     pub wins: [u32; 2],
     /// Games without a winner.
     pub draws: u32,
-    /// Goals of each team, without points for fouls; 10 for a game that the other side forfeited.
+    /// Goals of each team, without points for fouls; for a game that the other side forfeited 10, or the goals of a larger lead.
     pub goals: [u64; 2],
 }
 

@@ -1,20 +1,20 @@
-//! The rules that decide a game: points, forfeits, final score and winner.
+//! The rules that decide a game: final score, forfeits and winner; and the points in the standings that it gives.
 
 use super::{
-    result::{DrawReason, ForfeitKind, GameResult, WinReason},
+    game_result::{DrawReason, ForfeitKind, GameResult, WinReason},
     side::Side,
 };
 use crate::tier::tier_of;
 use faceoff_types::{FOULS_PER_POINT, ForfeitScore, Tier};
 use std::cmp::Ordering;
 
-/// Points of a won game.
+/// Points in the standings of a won game.
 pub const POINTS_WIN: u32 = 3;
-/// Points of a drawn game.
+/// Points in the standings of a drawn game.
 pub const POINTS_DRAW: u32 = 1;
-/// Points of a lost game.
+/// Points in the standings of a lost game.
 pub const POINTS_LOSS: u32 = 0;
-/// Goals of the other side in a forfeited game, unless it led by more.
+/// Goals of the other side in a forfeited game; some tournaments keep its lead if it led by more ([`ForfeitScore`]).
 pub const FORFEIT_GOALS: u32 = 10;
 
 /// The numbers that decide a game. Pairs are `[home, away]`.
@@ -39,7 +39,8 @@ pub fn final_score(goals: [u32; 2], fouls: [u32; 2]) -> [u32; 2] {
     ]
 }
 
-/// Score (or goals) of a forfeited game that stood at `played`; 0 : 0 if both sides forfeited. `None` without a forfeit.
+/// Score (or goals) that a forfeited game counts by `rule` if it stood at `played`; 0 : 0 if both sides forfeited. `None` without a
+/// forfeit.
 #[must_use]
 pub fn forfeit_score(
     rule: ForfeitScore,
@@ -150,7 +151,7 @@ mod tests {
         })
     }
 
-    /// Up to 135 penalty points over the 90 windows of a game a side is not non-deployable.
+    /// Up to 135 penalty points over the 90 windows of a game a side is at least improvable; with more it is non-deployable and loses.
     #[test]
     fn tier_takes_precedence_over_score() {
         let won = |winner, reason| GameResult::Won { winner, reason };

@@ -29,9 +29,9 @@ pub struct StandingsRow {
     pub draws: u32,
     /// Number of lost games.
     pub losses: u32,
-    /// Goals scored, without points for fouls; 10 for a game that the other side forfeited.
+    /// Goals scored, without points for fouls; for a game that the other side forfeited 10, or the goals of a larger lead.
     pub goals_for: u64,
-    /// Goals conceded, without points for fouls; 10 for a game that the team forfeited.
+    /// Goals conceded, without points for fouls; for a game that the team forfeited 10, or the goals of the opponent's larger lead.
     pub goals_against: u64,
     /// Total penalty points of the games that count.
     pub penalty_points: f64,

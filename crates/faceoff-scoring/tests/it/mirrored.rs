@@ -33,8 +33,8 @@ fn pairs(leads: &[[i32; 2]]) -> Vec<Value> {
 }
 
 #[test]
-fn opposite_luck_in_both_halves_cancels() {
-    // Luck of ±3 for the home team, in addition to one goal of skill.
+fn opposite_luck_in_both_games_cancels() {
+    // A leads by one goal of skill, and luck moves its lead by +3 in one game of the pair and by −3 in the other.
     let leads: Vec<_> = (0..20)
         .map(|n| if n % 2 == 0 { [4, -2] } else { [-2, 4] })
         .collect();
@@ -53,7 +53,7 @@ fn opposite_luck_in_both_halves_cancels() {
 }
 
 #[test]
-fn equal_luck_in_both_halves_doubles_variance() {
+fn equal_luck_in_both_games_doubles_variance() {
     let leads: Vec<_> = (0..20).map(|n| [n % 3, n % 3]).collect();
     let variances = find_mirrored_pairs(&games(&pairs(&leads)))
         .unwrap()
@@ -63,7 +63,7 @@ fn equal_luck_in_both_halves_doubles_variance() {
 }
 
 #[test]
-fn independent_halves_have_ratio_one() {
+fn independent_games_of_a_pair_have_ratio_one() {
     // Each combination of both halves' results is equally frequent, so the covariance is 0.
     let leads: Vec<_> = (0..50).map(|n| [n % 5 - 2, n / 5 % 5 - 2]).collect();
     let mut games_of_pairs = pairs(&leads);

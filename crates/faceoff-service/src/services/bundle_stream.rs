@@ -173,7 +173,7 @@ impl RateGuardedBody {
         }
     }
 
-    /// The bytes that arrive are kept.
+    /// The body of one part of a partial upload: bytes that arrive are kept, even if the rest does not follow.
     pub(super) fn of_part(body: Body, rate: MinTransferRate) -> Self {
         Self {
             retry_advice: "what has arrived is kept; GET /api/v1/uploads/HASH says how much, send the rest",

@@ -1,7 +1,7 @@
 //! Departures of teams from a tournament: a team withdraws, or organisers withdraw or disqualify it.
 
 use super::{
-    decisions::{Preview, checked_reason, reason_sentence},
+    decision_preview::{Preview, checked_reason, reason_sentence},
     entrants,
 };
 use crate::{

@@ -1,7 +1,7 @@
 //! Evaluation days and evaluations that an organiser starts, cancels or reruns. At the cutoff of an *evaluation day* the
 //! server starts one *evaluation* for each team: it runs all tasks of the day with the team's active submission.
 
-use super::decisions::{Preview, checked_reason, reason_sentence};
+use super::decision_preview::{Preview, checked_reason, reason_sentence};
 use crate::{
     app::AppState,
     boxed,

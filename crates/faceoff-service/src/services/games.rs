@@ -1,6 +1,6 @@
 //! Decisions of organisers about games of a round: voiding a result, and rerunning a game.
 
-use super::decisions::{Preview, checked_reason, reason_sentence};
+use super::decision_preview::{Preview, checked_reason, reason_sentence};
 use crate::{
     app::AppState,
     boxed,

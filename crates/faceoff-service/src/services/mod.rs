@@ -4,8 +4,8 @@
 pub mod accounts;
 pub mod announcements;
 pub mod bundle_stream;
-pub mod clock;
-pub mod decisions;
+pub mod clock_step;
+pub mod decision_preview;
 pub mod departures;
 pub mod entrants;
 pub mod evaluations;

@@ -1,7 +1,7 @@
 //! Decisions of organisers about results, teams and the queue: voiding an evaluation or a day, pausing the queue, and
 //! disqualifying a team. A *voided* evaluation no longer counts on any board.
 
-use super::decisions::{Preview, checked_reason, count_text, reason_sentence};
+use super::decision_preview::{Preview, checked_reason, count_text, reason_sentence};
 use crate::{
     app::AppState,
     boxed,

@@ -2,7 +2,7 @@
 
 use super::{
     accounts::{checked_profile, default_expiry, join_link},
-    decisions::checked_reason,
+    decision_preview::checked_reason,
 };
 use crate::{app::AppState, boxed, problem::Problem, text, views::invitation};
 use faceoff_api::{

@@ -1,7 +1,7 @@
 //! The end of a stage: freezing its boards, starting its final evaluation day, and signing its result off. A *frozen* board
 //! shows no later results; after the *sign-off* the result cannot change any more.
 
-use super::decisions::{Preview, checked_reason};
+use super::decision_preview::{Preview, checked_reason};
 use crate::{
     app::AppState,
     boxed,

@@ -87,6 +87,7 @@ fn checked_text<'t>(
     max_chars: usize,
 ) -> Result<Option<Option<&'t str>>, Problem> {
     let text = text.as_ref().map(|text| text.as_deref().map(str::trim));
+    // 1 stands for null or no field, which are valid.
     let chars = text.flatten().map_or(1, |text| text.chars().count());
     if !(1..=max_chars).contains(&chars) {
         let detail = format!("expected 1 to {max_chars} characters, or null, got {chars}");

@@ -1,7 +1,7 @@
 //! Tournaments: opening, changing, pausing and closing them.
 
 use super::{
-    decisions::{Preview, checked_reason},
+    decision_preview::{Preview, checked_reason},
     entrants,
     stages::{check_offered, check_season_magnitudes, parse_name},
 };

@@ -1,6 +1,6 @@
 //! Decisions about remote workers, which are processes on other machines that run jobs of this server.
 
-use super::decisions::checked_reason;
+use super::decision_preview::checked_reason;
 use crate::{app::AppState, boxed, problem::Problem};
 use faceoff_store::Actor;
 use faceoff_types::WorkerName;

@@ -1,4 +1,4 @@
-//! Attempts at a game: a slot of a worker starts to play it. A game has several attempts if one ends without a result.
+//! Attempts at a game. An attempt begins when a slot of a worker starts to play the game; if it ends without a result, another one follows.
 
 use faceoff_api::views::{
     attempt::{AttemptOutcomeView, GameAttemptView},

@@ -1,6 +1,7 @@
 //! Boards: the ranks of the teams in a stage, and their statistical uncertainty. A board belongs to one revision of the stage's
-//! rules. It ranks by *tier* (grade of safety) first, if the competition has tiers, then by score. Teams in the same *rank group* are statistically tied with
-//! the first team of the group. A *baseline* is a team of the organisers, which is shown for comparison, without a rank.
+//! rules. It ranks by *tier* (grade of safety) first, if the competition has tiers, then by score. Teams in the same *rank group* are
+//! statistically tied with the first team of the group. A *baseline* is a team of the organisers, which is shown for comparison, without a
+//! rank.
 
 use crate::{
     aggregated_rows::AggregatedRow,
@@ -101,7 +102,7 @@ pub async fn query(
         None => app.store.board_revision_within(&stage, &scope).await?,
     };
     if let Some(day) = query.day
-        && !visibility.is_hidden(stage.id)
+        && !visibility.hides_scores(stage.id)
     {
         let days = app.store.board_days(stage.id, revision, &scope).await?;
         check_has_results(day, &days)?;
@@ -127,8 +128,8 @@ pub async fn query(
     })
 }
 
-/// The board of a stage under one revision of its rules, from the results within `scope` and from `extra` results that
-/// are treated as if they counted. The number of database reads does not depend on the number of teams.
+/// The board of a stage under one revision of its rules, from the results within `scope` and from `extra` results: those of a proposed
+/// re-evaluation, as if they counted. The number of database reads does not depend on the number of teams.
 #[boxed]
 pub async fn build(
     app: &AppState,
@@ -155,7 +156,7 @@ pub async fn build(
         Some(counting_result) => counting_result,
         None => board_rows::counting_result(app, stage, scope).await?,
     };
-    let (rows, baselines) = if visibility.is_hidden(stage.id) {
+    let (rows, baselines) = if visibility.hides_scores(stage.id) {
         Default::default()
     } else {
         ranked_rows(
@@ -219,59 +220,66 @@ async fn ranked_rows(
     selection: &BoardSelection,
 ) -> Result<(Vec<BoardRow>, Vec<BaselineRow>), Problem> {
     let task = selection.task;
-    let mut rows = board_rows::rows(app, stage, revision, results, counting_result, task).await?;
-    rows.retain(|row| {
+    let mut aggregated_rows =
+        board_rows::rows(app, stage, revision, results, counting_result, task).await?;
+    aggregated_rows.retain(|row| {
         let team = &row.record.team;
         team.is_baseline || selection.is_ranked(team.profile.division.as_ref())
     });
-    let runs: Vec<_> = rows.iter().flat_map(|row| row.runs.clone()).collect();
+    let runs: Vec<_> = aggregated_rows
+        .iter()
+        .flat_map(|row| row.runs.clone())
+        .collect();
     let summaries = app.summaries.load(&runs).await?;
     let mismatch_seed = app.store.season().await?.secret.model_mismatch();
-    let rows: Vec<Row> = rows
+    let summarised_rows: Vec<SummarisedRow> = aggregated_rows
         .into_iter()
-        .map(|aggregated| Row::new(aggregated, &summaries, app.config.competition()))
+        .map(|aggregated| SummarisedRow::new(aggregated, &summaries, app.config.competition()))
         .collect::<Result<_, _>>()?;
-    let all_ranked = board_rows::rank(rows, task, |row| &row.aggregated.record);
-    let (ranked, baselines) = board_rows::split_baselines(all_ranked, |row: &Row| {
+    let all_ranked = board_rows::rank(summarised_rows, task, |row| &row.aggregated.record);
+    let (ranked, baselines) = board_rows::split_baselines(all_ranked, |row: &SummarisedRow| {
         row.aggregated.record.team.is_baseline
     });
     let groups = rank_groups(&ranked, |leader, row| {
         let [leader, row] = [leader, row].map(|row| row.to_compared(mismatch_seed));
         Ok::<_, Problem>(leader.differs_significantly(&row, task))
     })?;
-    let rows = ranked.into_iter().zip(groups);
-    let rows = rows.map(|(ranked, rank_group)| row_view(ranked, rank_group, task));
-    // Baselines have no rank group.
+    let views = ranked
+        .into_iter()
+        .zip(groups)
+        .map(|(ranked, rank_group)| row_view(ranked, rank_group, task));
+    // Baselines have no rank group: `baseline_row` drops the 0.
     let baselines = baselines
         .into_iter()
         .map(|ranked| row_view(ranked, 0, task));
-    Ok((rows.collect(), baselines.map(baseline_row).collect()))
+    Ok((views.collect(), baselines.map(baseline_row).collect()))
 }
 
-/// A row with the summary of its episodes.
-struct Row {
+/// A team's row with the weights of the tasks and the summary of its episodes, as statistical comparisons need them.
+struct SummarisedRow {
     aggregated: AggregatedRow,
     weights: TaskWeights,
+    /// Of all evaluations that the row aggregates.
     summary: Arc<EpisodeSummary>,
 }
 
-impl Row {
+impl SummarisedRow {
     fn new(
         aggregated: AggregatedRow,
         summaries: &RunSummaries,
         competition: &Competition,
     ) -> Result<Self, Problem> {
-        let day_summaries = aggregated.runs.iter().map(|run| {
+        let run_summaries = aggregated.runs.iter().map(|run| {
             let summary = summaries.get(run);
             summary.ok_or_else(|| Problem::internal(format_args!("run {run} has no summary")))
         });
-        let day_summaries: Vec<&Arc<EpisodeSummary>> = day_summaries.collect::<Result<_, _>>()?;
-        let summary = match day_summaries[..] {
+        let run_summaries: Vec<&Arc<EpisodeSummary>> = run_summaries.collect::<Result<_, _>>()?;
+        let summary = match run_summaries[..] {
             [summary] => Arc::clone(summary),
             _ => {
-                let day_summaries: Vec<&EpisodeSummary> =
-                    day_summaries.iter().map(|summary| &***summary).collect();
-                Arc::new(joined_summary(&day_summaries))
+                let run_summaries: Vec<&EpisodeSummary> =
+                    run_summaries.iter().map(|summary| &***summary).collect();
+                Arc::new(joined_summary(&run_summaries))
             }
         };
         Ok(Self {
@@ -297,7 +305,7 @@ impl Row {
 }
 
 /// A row of the response. Seed and episode data of a day without release are left out.
-fn row_view(ranked: RankedEntry<Row>, rank_group: u32, task: Option<Task>) -> BoardRow {
+fn row_view(ranked: RankedEntry<SummarisedRow>, rank_group: u32, task: Option<Task>) -> BoardRow {
     let RankedEntry { rank, tier, entry } = ranked;
     let (row, result) = (entry.key, entry.result);
     let AggregatedRow {

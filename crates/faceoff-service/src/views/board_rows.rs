@@ -39,7 +39,7 @@ pub(super) async fn counting_result(
 }
 
 /// One row for each team with a result within the scope under a revision of a stage's rules, ordered by team name.
-/// `extra` results are treated as if they counted.
+/// `extra` results, those of a proposed re-evaluation, are treated as if they counted.
 pub(super) async fn rows(
     app: &AppState,
     stage: &Stage,

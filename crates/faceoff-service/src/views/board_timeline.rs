@@ -58,7 +58,7 @@ impl BoardTimeline {
             days: Vec::new(),
             previous_board: None,
         };
-        if visibility.is_hidden(board.stage) {
+        if visibility.hides_scores(board.stage) {
             return Ok(timeline);
         }
         let frozen = board.frozen.as_ref().filter(|_| !is_live);

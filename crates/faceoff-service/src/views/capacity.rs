@@ -21,7 +21,7 @@ struct Load {
     expected_ms: Option<f64>,
     /// Duration on one slot if every agent uses up its time limits.
     longest_s: f64,
-    /// The deadline, and the hours until then.
+    /// The deadline, and the hours until then: from now or, before the day's cutoff, from the cutoff.
     deadline: Option<(Timestamp, f64)>,
 }
 
@@ -101,7 +101,7 @@ fn summary(day: &DayLoad) -> String {
 }
 
 /// Load of the day of the next cutoff, if the submissions that are active now stay active.
-fn next_load(
+fn next_day_load(
     stage: &Stage,
     day: Date,
     cutoff_at: Timestamp,
@@ -140,7 +140,7 @@ fn next_load(
 }
 
 /// Remaining load of a day that is under way.
-fn open_load(
+fn running_day_load(
     day: &faceoff_store::Day,
     backlog: &[EvaluationBacklog],
     capacity: &Capacity,
@@ -191,10 +191,10 @@ pub async fn forecast(
 ) -> Result<CapacityView, StoreError> {
     let stage = store.stage(id).await?;
     let (backlog, durations) = store.evaluation_backlog(now).await?;
-    let under_way = store.unreleased_days(id).await?;
-    let mut loads: Vec<Load> = under_way
+    let running_days = store.unreleased_days(id).await?;
+    let mut loads: Vec<Load> = running_days
         .iter()
-        .map(|day| open_load(day, &backlog, capacity, now))
+        .map(|day| running_day_load(day, &backlog, capacity, now))
         .collect();
     let season_is_open = store.season().await?.closed_at.is_none();
     let next = store.next_cutoff(&stage, now).await?;
@@ -203,7 +203,7 @@ pub async fn forecast(
         active.retain(|submission| stage.check_accepts(submission).is_ok());
         let teams: Vec<TeamId> = active.iter().map(|submission| submission.team).collect();
         let cutoff_at = at.unwrap_or(now).max(now);
-        loads.push(next_load(
+        loads.push(next_day_load(
             &stage, day, cutoff_at, &teams, &durations, capacity,
         ));
     }
@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn fit_and_summary_follow_from_hours() {
+    fn forecast_and_its_text_follow_from_hours() {
         for (expected_hours, worst_hours, available_hours, fit, phrase) in [
             (Some(10.0), 20.0, Some(24.0), Fit::Surely, "it fits"),
             (None, 20.0, Some(24.0), Fit::Surely, "it fits"),

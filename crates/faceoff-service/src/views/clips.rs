@@ -4,8 +4,8 @@
 use crate::{
     app::AppState,
     archive_contents, boxed,
+    day_release::check_released,
     problem::{Problem, ProblemKind},
-    release::check_released,
     views::{
         clip_file::{ClipFile, Episode},
         visibility::Visibility,

@@ -3,8 +3,8 @@
 use crate::{
     app::AppState,
     boxed,
+    day_release::check_released,
     problem::{Problem, ProblemKind},
-    release::check_released,
     views::visibility::Visibility,
 };
 use faceoff_api::{

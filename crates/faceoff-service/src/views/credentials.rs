@@ -5,7 +5,8 @@ use faceoff_api::views::credentials::EndedCredentialsView;
 use faceoff_store::EndedCredentials;
 use jiff::Timestamp;
 
-/// What ended and which accounts stay; `None` if there is nothing of either.
+/// The credentials that ended, and the accounts that stay although they were created or restored by such an invitation. `None` if there is
+/// neither.
 pub fn ended(ended: EndedCredentials, now: Timestamp) -> Option<EndedCredentialsView> {
     if ended == EndedCredentials::default() {
         return None;

@@ -52,7 +52,7 @@ pub async fn build(
     let team = app.store.team(evaluation.team).await?;
     let run = evaluation.run;
     let shows_faults = visibility.has_team_access(&evaluation)
-        && !visibility.is_hidden(evaluation.stage_day.stage);
+        && !visibility.hides_scores(evaluation.stage_day.stage);
     let mut view = evaluation_view(visibility, evaluation, team.name);
     if let EvaluationStatus::AgentFailed { faults, log, .. } = &mut view.status
         && view.released_at.is_some()
@@ -156,10 +156,10 @@ fn evaluation_view(
 ) -> EvaluationView {
     let is_released = evaluation.released_at.is_some();
     let has_dataset = evaluation.dataset_removed.is_none();
-    let (is_hidden, is_public) = (
-        visibility.is_hidden(evaluation.stage_day.stage),
-        visibility.is_public(&evaluation),
-    );
+    // A blind stage hides scores and dataset from all but the organisers. Whether the evaluation is public, for visitors without a token,
+    // is another question.
+    let hides_scores = visibility.hides_scores(evaluation.stage_day.stage);
+    let is_public = visibility.is_public(&evaluation);
     let episodes_total = evaluation.plan.episodes_total();
     let episodes_done = match &evaluation.state {
         EvaluationState::Running { progress, .. } => {
@@ -183,10 +183,10 @@ fn evaluation_view(
             ..
         } => EvaluationStatus::Finished {
             finished_at,
-            result: (!is_hidden).then(|| Box::new(ResultView::new(*result, is_released))),
-            dataset: (!is_hidden && has_dataset)
+            result: (!hides_scores).then(|| Box::new(ResultView::new(*result, is_released))),
+            dataset: (!hides_scores && has_dataset)
                 .then(|| format!("{}/dataset", paths::evaluation(evaluation.id))),
-            dataset_blake3: dataset_blake3.filter(|_| !is_hidden),
+            dataset_blake3: dataset_blake3.filter(|_| !hides_scores),
         },
         EvaluationState::AgentFailed { finished_at } => EvaluationStatus::AgentFailed {
             finished_at,
@@ -235,7 +235,7 @@ fn evaluation_view(
             ),
         extra_evaluation: evaluation.extra_reason,
         voided: evaluation.voided.map(decision::view),
-        blind: is_hidden,
+        blind: hides_scores,
         public: is_public,
         dataset_removed: evaluation.dataset_removed.map(decision::view),
         profile: evaluation.plan.profile,

@@ -153,16 +153,16 @@ fn status(state: &TournamentState, viewer: Viewer, game: &Game) -> Result<GameSt
             attempt: *attempt,
             since: *since,
         },
-        GameState::Played(played_row) => {
+        GameState::Played(stored_result) => {
             let (score, played) = state.result(game)?.ok_or_else(|| {
                 Problem::internal(format_args!("game {} is played without a result", game.id))
             })?;
-            let recording = played_row.recording.as_ref();
+            let recording = stored_result.recording.as_ref();
             let recording = recording
                 .map(|recording| recording_view(state.visibility(viewer), game, &score, recording));
             GameStatus::Played {
-                attempt: played_row.attempt,
-                finished_at: played_row.at,
+                attempt: stored_result.attempt,
+                finished_at: stored_result.at,
                 result: Box::new(result_view(&score, &played, recording)),
             }
         }
@@ -233,7 +233,7 @@ fn next_text(state: &TournamentState, game: &Game) -> &'static str {
         GameState::Queued => {
             "It starts as soon as a slot is free; games of rounds come first, in the order of matchdays."
         }
-        GameState::Running { .. } => "It is running; its result is published at once when it ends.",
+        GameState::Running { .. } => "It is running; its result is shown at once when it ends.",
         GameState::Played(_) => "Done. Its result stays.",
         GameState::PlatformFailed { .. } if counts_in_tournament => {
             "It does not count. An organiser has to rerun it, with the same seed, before the tournament continues."

@@ -56,7 +56,7 @@ pub async fn query(
     }
     let division = division::find(app, query.division).await?;
     let requested_result = query.by.map(BoardBy::counting_result);
-    let mut records = if visibility.is_hidden(stage.id) {
+    let mut records = if visibility.hides_scores(stage.id) {
         Vec::new()
     } else {
         let days = BoardDays::All;
@@ -76,7 +76,7 @@ pub async fn query(
         }
         (None, counting_result) => counting_result,
     };
-    let rows = rows(
+    let rows = history_rows(
         records,
         counting_result_on,
         final_day,
@@ -102,7 +102,7 @@ pub async fn query(
 }
 
 /// The rows of each day with the ranks of that day's board. `records` are grouped by team.
-fn rows(
+fn history_rows(
     records: Vec<BoardRecord>,
     counting_result_on: impl Fn(Date) -> CountingResult,
     final_day: Option<Date>,
@@ -140,7 +140,7 @@ fn rows(
             .iter()
             .filter_map(|record| {
                 let team = record.team.id;
-                row(
+                history_row(
                     record,
                     task,
                     rank_of(&ranked, team),
@@ -160,7 +160,7 @@ fn rank_of(rows: &[RankedEntry<AggregatedRow>], team: TeamId) -> Option<u32> {
 }
 
 /// A result with the team's rank on its day, or the rank that a baseline would have; `None` if the task was not evaluated.
-fn row(
+fn history_row(
     record: &BoardRecord,
     task: Option<Task>,
     rank: Option<u32>,

@@ -32,6 +32,7 @@ use faceoff_types::{ProposalId, TeamId};
 use jiff::Timestamp;
 use std::collections::BTreeSet;
 
+/// `is_dropped`: the organisers have dropped the proposal, so its datasets are no longer offered.
 async fn evaluation_view(
     app: &AppState,
     evaluation: ProposedEvaluation,

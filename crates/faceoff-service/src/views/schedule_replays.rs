@@ -44,7 +44,7 @@ fn count_champions(state: &TournamentState, games: &[Game]) -> Result<ChampionSh
             replays.entry(replay).or_default().push(game);
         }
     }
-    let mut first_places = Vec::<TeamName>::new();
+    let mut champions = Vec::<TeamName>::new();
     let mut incomplete_count = 0;
     for games in replays.values() {
         // A replay is incomplete if one of its games has ended without a result.
@@ -60,7 +60,7 @@ fn count_champions(state: &TournamentState, games: &[Game]) -> Result<ChampionSh
             incomplete_count += 1;
         } else if !is_running {
             let tables = state.tables(&state.results(games.iter().copied())?);
-            first_places.extend(tables.first().and_then(first_place));
+            champions.extend(tables.first().and_then(first_place));
         }
     }
     let played = games
@@ -71,11 +71,11 @@ fn count_champions(state: &TournamentState, games: &[Game]) -> Result<ChampionSh
         .filter(|game| !matches!(game.state, GameState::Cancelled { .. }));
     Ok(ChampionSharesView {
         replays: to_u32(replays.len()),
-        complete: to_u32(first_places.len()),
+        complete: to_u32(champions.len()),
         given_up: incomplete_count,
         games: to_u32(to_be_played.count()),
         games_played: to_u32(played.count()),
-        champions: compute_champion_shares(&first_places),
+        champions: compute_champion_shares(&champions),
     })
 }
 

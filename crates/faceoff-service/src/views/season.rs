@@ -56,7 +56,7 @@ pub async fn build(app: &AppState, viewer: Viewer) -> Result<SeasonView, Problem
                 finished,
                 seed: day
                     .released_at
-                    .filter(|_| !visibility.is_hidden(day.stage_day.stage))
+                    .filter(|_| !visibility.hides_scores(day.stage_day.stage))
                     .and_then(|_| seeds.get(&day.stage_day).copied()),
             })
             .collect(),

@@ -171,7 +171,7 @@ pub fn round_view(state: &TournamentState, round: &TournamentRound) -> Result<Ro
     })
 }
 
-/// Counts a game by its state.
+/// Counts a game in the field of its state.
 const fn count_game(progress: &mut RoundProgress, state: &GameState) {
     progress.games += 1;
     *match state {
@@ -199,6 +199,7 @@ fn games_in_round(
         })
 }
 
+/// The phase: open for entrants, in a round, between two rounds, all rounds played, or closed by the organisers.
 pub(super) fn phase(state: &TournamentState) -> TournamentPhase {
     let last_round = state.tournament.rules.format.last_round();
     if state.tournament.closed_at.is_some() {

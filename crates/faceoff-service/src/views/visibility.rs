@@ -36,6 +36,7 @@ struct StageRestrictions {
     is_blind: bool,
     /// When evaluations become public automatically.
     publication: Publication,
+    /// Whether the stage or the whole season has closed.
     has_closed: bool,
     /// The freeze of the boards, if they are frozen.
     frozen: Option<DecisionRecord>,
@@ -87,7 +88,8 @@ impl Visibility {
         Self::load(app, Viewer::Organiser).await
     }
 
-    /// The progress of a run, as the viewer may see it: others than organisers see whole shards, once a minute.
+    /// The number of finished episodes of a run, as the viewer may see it. Teams and visitors see only whole shards (parts of a run), once
+    /// a minute.
     pub(crate) fn episodes_done(&self, progress: &RunProgress) -> u32 {
         match self.viewer {
             Viewer::Organiser => progress.episodes_done,
@@ -103,8 +105,8 @@ impl Visibility {
         self.viewer.check_organiser(resource)
     }
 
-    /// Whether a stage's scores are hidden from the viewer.
-    pub fn is_hidden(&self, stage: StageId) -> bool {
+    /// Whether a stage's scores are hidden from the viewer: the stage is blind, and the viewer is no organiser.
+    pub fn hides_scores(&self, stage: StageId) -> bool {
         let is_blind = self.stages.get(&stage).is_none_or(|stage| stage.is_blind);
         is_blind && self.viewer != Viewer::Organiser
     }
@@ -114,7 +116,7 @@ impl Visibility {
     /// # Errors
     /// `Blind`.
     pub fn check_not_blind(&self, stage: StageId) -> Result<(), Problem> {
-        if !self.is_hidden(stage) {
+        if !self.hides_scores(stage) {
             return Ok(());
         }
         let name = self

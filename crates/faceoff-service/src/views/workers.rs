@@ -41,8 +41,8 @@ pub fn current(app: &AppState) -> WorkersView {
     let problems =
         problems.map(|(operation, error)| format!("The server cannot {operation}: {error}"));
     let all = workers.all();
-    let stuck_jobs = all.iter().flat_map(stuck_jobs);
-    let problems = problems.chain(stuck_jobs).collect();
+    let unsent_results = all.iter().flat_map(unsent_results);
+    let problems = problems.chain(unsent_results).collect();
     let alarms = all
         .iter()
         .flat_map(|worker| long_jobs(worker, now))
@@ -62,7 +62,7 @@ pub fn current(app: &AppState) -> WorkersView {
 }
 
 /// Descriptions of jobs whose result a worker cannot send.
-fn stuck_jobs(worker: &WorkerStatus) -> impl Iterator<Item = String> {
+fn unsent_results(worker: &WorkerStatus) -> impl Iterator<Item = String> {
     worker.busy_slots.iter().filter_map(|(slot, busy)| {
         let problem = busy.problem.as_ref()?;
         let job = describe(worker, slot, busy);

@@ -22,7 +22,7 @@ pub(super) struct Latency {
     pending: PendingCommand,
 }
 
-/// The command that the robot gets at the next control step.
+/// The command of the previous control step, which the robot gets at the next one.
 #[derive(Debug, Clone, PartialEq)]
 enum PendingCommand {
     /// At the start of an episode: the robot holds its position.
@@ -47,8 +47,8 @@ impl Latency {
         }
     }
 
-    /// Replaces the puck of an observation by its state one or two control steps ago. At the start of an
-    /// episode there is no earlier state.
+    /// Replaces the puck of an observation by its state one or two control steps ago. The first observation of an episode has no earlier
+    /// state and stays as it is.
     pub(super) fn delay(&mut self, observation: &mut [f64]) {
         let now: [f64; PUCK_LEN] = std::array::from_fn(|i| observation[i]);
         let [one_step_ago, two_steps_ago, _] = self.pucks.unwrap_or([now; MAX_LAG_STEPS + 1]);

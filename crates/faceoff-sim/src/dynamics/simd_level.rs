@@ -11,14 +11,14 @@ pub struct SimdLevel(Registers);
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Registers {
-    /// Those that every CPU of the target has.
+    /// Those that every CPU of the target has: two numbers each on x86-64.
     Plain,
     #[cfg(target_arch = "x86_64")]
     Avx(Avx),
 }
 
 impl SimdLevel {
-    /// The baseline registers of the target: two numbers each on x86-64.
+    /// The registers that every CPU of the target has: two numbers each on x86-64.
     pub const PLAIN: Self = Self(Registers::Plain);
 
     /// The 256-bit registers of AVX; `None` on a machine without AVX.

@@ -9,13 +9,13 @@ use crate::{
 };
 use faceoff_types::{ViolationName, Violations};
 
-/// End-effector position: over the table and at its height.
+/// Name of the violation of the end effector's bounds: it must be over the table and at its height.
 pub const EE: ViolationName = ViolationName::new("ee");
-/// Height of elbow (link 4) and wrist (link 7).
+/// Name of the violation by elbow (link 4) or wrist (link 7): they must not be too low.
 pub const LINK: ViolationName = ViolationName::new("link");
-/// Joint positions within 95 % of their limits.
+/// Name of the violation of joint positions: they must be within 95 % of their limits.
 pub const JOINT_POS: ViolationName = ViolationName::new("joint_pos");
-/// Filtered joint velocities within 95 % of their limits.
+/// Name of the violation of joint velocities: filtered, they must be within 95 % of their limits.
 pub const JOINT_VEL: ViolationName = ViolationName::new("joint_vel");
 
 /// Tolerance ± of the end effector's height, m.
@@ -24,8 +24,8 @@ pub const HEIGHT_TOLERANCE_M: f64 = 0.02;
 /// Least height of elbow and wrist in the robot's base frame, m.
 pub const LINK_HEIGHT_M: f64 = 0.25;
 
-/// For each constraint, the largest excess over one of its bounds. A constraint is violated if its value is above 0. Joint positions are in rad,
-/// joint velocities in rad/s, the others in m.
+/// For each constraint, the largest excess over one of its bounds. A constraint is violated if its value is above 0. Joint positions are in
+/// rad, joint velocities in rad/s, the others in m.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ConstraintValues {
     /// Joint positions against 95 % of their range.

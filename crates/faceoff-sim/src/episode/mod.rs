@@ -35,6 +35,7 @@ pub struct Episode {
     table: TablePerturbations,
     /// Control steps so far.
     steps: u32,
+    /// Whether the (simulated) tracking has lost the puck.
     puck_lost: bool,
     /// Constraints violated so far.
     violations: ViolatedConstraints,

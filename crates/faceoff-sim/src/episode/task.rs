@@ -51,7 +51,7 @@ pub struct TaskRules {
     pub success_x_m: [f64; 2],
     /// Bound on vx below which `defend` and `prepare` succeed, m/s.
     pub success_vx_m_s: f64,
-    /// A faster puck counts as lost, m/s.
+    /// A faster puck counts as having left the table, m/s.
     pub lost_speed_m_s: f64,
 }
 
@@ -89,7 +89,7 @@ pub fn initial_puck(task: AirHockeyTask, stream: &mut RandomStream) -> [f64; 6] 
     // Uniform in [0, 1).
     let u: [f64; 6] = std::array::from_fn(|_| stream.unit());
     let between = |[low, high]: [f64; 2], u: f64| low + (high - low) * u;
-    let around = |limit: f64, u: f64| between([-limit, limit], u);
+    let within_plus_minus = |limit: f64, u: f64| between([-limit, limit], u);
     // `angle` is measured from −x, towards the agent's goal.
     let moving = |x: f64, y: f64, speed: f64, angle: f64, yaw_rate: f64| {
         let (sin, cos) = libm::sincos(angle);
@@ -98,17 +98,17 @@ pub fn initial_puck(task: AirHockeyTask, stream: &mut RandomStream) -> [f64; 6] 
     match task {
         AirHockeyTask::Hit => moving(
             between(TASK_RULES.hit_x_m, u[0]),
-            around(PLAYABLE_Y_M, u[1]),
+            within_plus_minus(PLAYABLE_Y_M, u[1]),
             between(TASK_RULES.hit_speed_m_s, u[2]),
-            around(TASK_RULES.hit_angle_rad, u[3]),
-            around(TASK_RULES.hit_yaw_rate_rad_s, u[4]),
+            within_plus_minus(TASK_RULES.hit_angle_rad, u[3]),
+            within_plus_minus(TASK_RULES.hit_yaw_rate_rad_s, u[4]),
         ),
         AirHockeyTask::Defend => moving(
             between(TASK_RULES.defend_x_m, u[0]),
-            around(TASK_RULES.defend_y_m, u[1]),
+            within_plus_minus(TASK_RULES.defend_y_m, u[1]),
             between(TASK_RULES.defend_speed_m_s, u[2]),
-            around(TASK_RULES.defend_angle_rad, u[3]),
-            around(TASK_RULES.defend_yaw_rate_rad_s, u[4]),
+            within_plus_minus(TASK_RULES.defend_angle_rad, u[3]),
+            within_plus_minus(TASK_RULES.defend_yaw_rate_rad_s, u[4]),
         ),
         AirHockeyTask::Prepare => {
             // Ranges of x and |y|; a strip is drawn with a probability in proportion to its area.

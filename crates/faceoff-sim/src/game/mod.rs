@@ -34,7 +34,7 @@ pub struct GameSetup {
     pub settings: PerturbationSettings,
     /// The physical properties of both arms; nominal unless the factors contain the model mismatch.
     pub plant: Plant,
-    /// The game's seed. The random streams of a rally are derived from it and the rally's number.
+    /// The game's seed. The seed of each rally is derived from it and the rally's number.
     pub seed: Seed,
 }
 
@@ -51,7 +51,7 @@ pub struct Game {
     violations: [ViolatedConstraints; 2],
 }
 
-/// What a rally inherits from the game before it. With the game's setup it determines the start of the rally.
+/// What a rally inherits from the earlier part of its game. With the game's setup it determines the start of the rally.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct GameProgress {
     /// Number of the rally, from 0.

@@ -18,7 +18,7 @@ pub struct GameRules {
     pub middle_x_m: f64,
     /// A puck in the middle strip is stuck below this |vx|, m/s.
     pub stuck_vx_m_s: f64,
-    /// A faster puck counts as lost, m/s.
+    /// A faster puck counts as having left the table, m/s.
     pub lost_speed_m_s: f64,
 }
 
@@ -114,7 +114,7 @@ impl Referee {
         }
     }
 
-    /// The end of the rally, if the puck's state is one. Also counts how long the puck has been on its side.
+    /// How the rally ends, if the puck's state ends it. Also counts how long the puck has been on its side.
     fn rally_end(&mut self, puck: &Puck) -> Option<RallyEnd> {
         let [x, y, _] = puck.pose;
         let side_of_puck = usize::from(x > 0.0);

@@ -45,9 +45,9 @@ impl Plant {
         }
     }
 
-    /// Draws the plant of a season: factors on masses, gains, damping and friction, redrawn until
-    /// the largest static end-effector error over the workspace lies in the settings' range. `seed`
-    /// is the season's mismatch seed.
+    /// Draws the plant of a season: its masses, gains, damping and friction are those of the nominal model times random multipliers. They
+    /// are redrawn until the largest static end-effector error over the workspace lies in the settings' range. `seed` is the season's
+    /// mismatch seed.
     #[must_use]
     pub fn mismatched(settings: &PerturbationSettings, seed: Seed) -> Self {
         draw_in_range(&settings.model_mismatch, seed, MAX_DRAWS).0
@@ -60,8 +60,8 @@ impl Plant {
         draw_in_range(&settings.model_mismatch, seed, MAX_ACCEPTED_DRAWS).1
     }
 
-    /// The largest distance, m, between commanded and reached end-effector position over the workspace, at
-    /// rest, if dry friction carries no load.
+    /// The largest static error over the workspace, m: the distance between commanded and reached end-effector position at rest, if dry
+    /// friction carries no load.
     #[must_use]
     pub fn largest_static_error(&self) -> f64 {
         largest_static_error(self, &workspace())
@@ -89,14 +89,14 @@ fn draw_in_range(settings: &MismatchSettings, seed: Seed, max_draws: usize) -> (
 
 /// Draws one plant.
 fn draw(settings: &MismatchSettings, stream: &mut RandomStream) -> Plant {
-    let mut draw_factors = |[low, high]: [f64; 2]| -> [f64; JOINTS] {
+    let mut draw_multipliers = |[low, high]: [f64; 2]| -> [f64; JOINTS] {
         std::array::from_fn(|_| stream.uniform(low, high))
     };
-    let links = draw_factors(settings.mass);
-    let kp = draw_factors(settings.gains);
-    let kd = draw_factors(settings.gains);
-    let damping = draw_factors(settings.friction);
-    let friction = draw_factors(settings.friction);
+    let links = draw_multipliers(settings.mass);
+    let kp = draw_multipliers(settings.gains);
+    let kd = draw_multipliers(settings.gains);
+    let damping = draw_multipliers(settings.friction);
+    let friction = draw_multipliers(settings.friction);
     let [end_effector, mallet] = {
         let [low, high] = settings.mass;
         [stream.uniform(low, high), stream.uniform(low, high)]

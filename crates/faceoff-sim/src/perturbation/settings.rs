@@ -25,13 +25,14 @@ pub struct PerturbationSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct MismatchSettings {
-    /// Range of the factor on each link's mass and inertia.
+    /// Range of the multiplier of each link's mass and inertia.
     pub mass: [f64; 2],
-    /// Range of the factor on each joint's gains.
+    /// Range of the multiplier of each joint's controller gains.
     pub gains: [f64; 2],
-    /// Range of the factor on each joint's damping and dry friction.
+    /// Range of the multiplier of each joint's damping and dry friction.
     pub friction: [f64; 2],
-    /// Accepted range of the largest static end-effector error over the workspace, in metres.
+    /// Accepted range of the largest distance between commanded and reached end-effector position at rest, over the table, in metres.
+    /// Plants outside of it are drawn again.
     pub static_error_m: [f64; 2],
 }
 
@@ -100,7 +101,7 @@ impl Default for DisturbanceSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TrackingLossSettings {
-    /// Probability per control step, while tracked.
+    /// Probability per control step that tracking loses the puck, while it is tracked.
     pub probability: f64,
     /// Shortest and longest loss, in control steps.
     pub steps: [u32; 2],

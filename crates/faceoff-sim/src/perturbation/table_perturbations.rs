@@ -1,4 +1,4 @@
-//! The perturbations that act on the table and on the tracking of the puck, and so on all robots alike.
+//! The perturbations that act on the table and on the tracking of the puck. Therefore they affect all robots alike.
 
 use super::{
     disturbance::Disturbance, rehearsal_table::RehearsalTable, tracking_loss::TrackingLoss,

@@ -65,13 +65,17 @@ impl<T: Lanes> SetpointLimiter<T> {
             let v_max = LINKS[i].velocity_limit_rad_s; // rad/s
             let previous = self.commanded[i];
             let clamp_velocity = |v: T| clamp(v, T::splat(-v_max), T::splat(v_max));
-            let slowest = clamp_velocity(gain * (previous + q_max));
-            let fastest = clamp_velocity(gain * (previous - q_max));
-            command.velocity[i] = clamp(replace_nan(desired.velocity[i], zero), slowest, fastest);
+            let lowest_velocity = clamp_velocity(gain * (previous + q_max));
+            let highest_velocity = clamp_velocity(gain * (previous - q_max));
+            command.velocity[i] = clamp(
+                replace_nan(desired.velocity[i], zero),
+                lowest_velocity,
+                highest_velocity,
+            );
             command.position[i] = clamp(
                 replace_nan(desired.position[i], previous),
-                previous + step * slowest,
-                previous + step * fastest,
+                previous + step * lowest_velocity,
+                previous + step * highest_velocity,
             );
         }
         self.commanded = command.position;

@@ -2,7 +2,7 @@
 
 use super::preview::{DecisionPreview, Done};
 use faceoff_api::requests;
-use faceoff_service::{app::AppState, problem::Problem, services::clock};
+use faceoff_service::{app::AppState, problem::Problem, services::clock_step};
 use faceoff_store::Actor;
 
 #[derive(Debug, Clone, Copy)]
@@ -17,7 +17,7 @@ impl ClockDecision {
             title: "Accept the system clock".to_owned(),
             button: "Accept the clock",
             ..DecisionPreview::needing_confirmation(
-                clock::preview_accepted_step(app)?,
+                clock_step::preview_accepted_step(app)?,
                 OVERVIEW_PATH,
             )
         })
@@ -29,7 +29,7 @@ impl ClockDecision {
         actor: Actor,
         request: requests::Decision,
     ) -> Result<Done, Problem> {
-        clock::accept_step(app, actor, request.confirm.as_deref()).await?;
+        clock_step::accept_step(app, actor, request.confirm.as_deref()).await?;
         Ok(Done::new("clock-accepted", OVERVIEW_PATH))
     }
 }

@@ -1,7 +1,7 @@
 //! The preview of a decision: what it will do, before an organiser confirms it.
 
 use crate::format;
-use faceoff_service::services::decisions::Preview;
+use faceoff_service::services::decision_preview::Preview;
 use faceoff_types::StageDay;
 
 /// Content of the page of a decision.

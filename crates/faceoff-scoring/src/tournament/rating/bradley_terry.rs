@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn unbeaten_side_is_finite_and_unplayed_side_is_prior() {
+    fn unbeaten_strength_is_finite_and_unplayed_strength_is_prior() {
         let strengths = fitted(3, &[TrialCounts::new([0, 1], [1_000_000, 0])], 2.0);
         assert!(strengths[0] > 3.0 && strengths[0] < 30.0, "{strengths:?}");
         assert_eq!(strengths[2], 0.0);

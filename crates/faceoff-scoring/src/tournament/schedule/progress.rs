@@ -54,8 +54,8 @@ impl<'a> Progress<'a> {
             .collect()
     }
 
-    /// The games of a round without a result, except those of teams that left. Whether such a team still plays the round is known to
-    /// the caller.
+    /// The games of a round without a result, except those of teams in `departures`. A team that has withdrawn but still plays the round is
+    /// not in that list yet: the caller sees to it.
     fn open_pairings<'b>(
         &'b self,
         round: &'a Round,

@@ -85,7 +85,7 @@ fn pairs<'a>(teams: &[&'a TeamName], pairing_counts: &PairingCounts<'a>) -> Vec<
         .collect();
     let have_not_met = |a: usize, b: usize| games[count * a + b] == 0;
     let mut remaining: Vec<usize> = (0..count).collect();
-    // Maximum number of new pairs among the remaining teams.
+    // Maximum number of pairs of remaining teams that have not met. Each choice below keeps this maximum reachable for the rest.
     let mut new_pairs = most_pairs(&remaining, have_not_met);
     let mut pairs = Vec::new();
     while let Some((upper, others)) = remaining.split_first() {
@@ -101,7 +101,7 @@ fn pairs<'a>(teams: &[&'a TeamName], pairing_counts: &PairingCounts<'a>) -> Vec<
             .find(|other| most_pairs(&without(*other), have_not_met) + 1 == new_pairs);
         // A repeat is unavoidable and falls to this team: it gets the opponent that it met least often.
         let opponent = opponent.or_else(|| {
-            new_pairs += 1; // this pair is not new
+            new_pairs += 1; // this pair has met, so the subtraction below must not count it
             let mut repeats: Vec<usize> = others.to_vec();
             repeats.sort_by_key(|other| games[count * upper + other]);
             repeats

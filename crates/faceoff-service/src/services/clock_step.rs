@@ -1,6 +1,7 @@
-//! A step (sudden change) of the system clock, which an organiser accepts if the new time is correct.
+//! A step (sudden change) of the system clock. The server continues its own time until an organiser accepts the step, because the new
+//! time is correct.
 
-use super::decisions::Preview;
+use super::decision_preview::Preview;
 use crate::{
     app::AppState,
     boxed,
@@ -16,7 +17,7 @@ use std::sync::{
 /// After the step each lease lasts at least this long, because some were renewed according to the old time.
 const MIN_LEASE_S: u32 = 60;
 
-/// The step that is not accepted.
+/// The step that is not accepted yet.
 fn current_step(app: &AppState) -> Result<ClockStep, Problem> {
     app.config.clock.step().ok_or_else(|| {
         Problem::new(
@@ -57,16 +58,17 @@ pub async fn accept_step(
     let clock = app.config.clock.clone();
     let (size, now) = (step.size(), step.server_at + step.shift());
     let is_accepted = Arc::new(AtomicBool::new(false));
-    let shared_flag = Arc::clone(&is_accepted);
+    let is_accepted_in_store = Arc::clone(&is_accepted);
+    // The store calls this in its transaction, which may still fail afterwards.
     let accept = Box::new(move || {
-        shared_flag.store(clock.accept(&step), Ordering::SeqCst);
-        shared_flag.load(Ordering::SeqCst)
+        is_accepted_in_store.store(clock.accept(&step), Ordering::SeqCst);
+        is_accepted_in_store.load(Ordering::SeqCst)
     });
     let stored = app
         .store
         .accept_clock_step(actor, step.shift(), size, now, accept);
     if let Err(error) = stored.await {
-        // Leases and due times were not moved.
+        // Leases and due times were not moved in the database, so the clock must not have moved either.
         if is_accepted.load(Ordering::SeqCst) {
             app.config.clock.revert(&step);
         }

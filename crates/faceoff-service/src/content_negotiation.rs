@@ -1,4 +1,4 @@
-//! What a client accepts: the formats and encodings between which responses choose.
+//! Content negotiation: the formats (page, JSON, CSV) and encodings (gzip) that a client accepts, between which responses choose.
 
 use axum::http::{HeaderMap, HeaderName, header};
 

@@ -1,4 +1,4 @@
-//! Means over several evaluations of one team, for boards that rank several days.
+//! Means over several evaluations of one team, one for each evaluation day, for boards that rank teams over several days.
 
 use crate::{
     evaluation::score_evaluation,
@@ -109,8 +109,8 @@ fn combined_seed(seeds: impl Iterator<Item = Seed>) -> Seed {
     Seed::from_bytes(*hash.finalize().as_bytes())
 }
 
-/// The episodes of several evaluations as those of one, in the given sequence. Its `tier_change` is 0, or absent in a
-/// competition without tiers: a bootstrap would need all outcomes.
+/// The episodes of several evaluations as those of one, in the given sequence. `tier_change`, the probability of another tier, is not
+/// estimated, since that needs the outcomes of all episodes: it is 0, or absent in a competition without tiers.
 #[must_use]
 pub fn joined_summary(summaries: &[&EpisodeSummary]) -> EpisodeSummary {
     let mut tasks: TaskMap<Vec<&TaskSummary>> = TaskMap::new();

@@ -3,8 +3,8 @@
 
 use super::{
     game::GameEntry,
-    points::{violation_names, violation_points},
-    result::{ForfeitKind, GameResult, ResultReason},
+    game_result::{ForfeitKind, GameResult, ResultReason},
+    penalty_points::{violation_names, violation_points},
     rules::{GameTally, final_score, forfeit_score, judge},
     side::Side,
 };
@@ -133,7 +133,7 @@ pub struct SideScore {
     pub goals: u32,
     /// Number of fouls.
     pub fouls: u32,
-    /// The score that counts, including points for the opponent's fouls; after a forfeit 10 : 0, or a larger lead.
+    /// The score that counts, including points for the opponent's fouls; after a forfeit 10 : 0, or the opponent's larger lead.
     pub score: u32,
     /// Penalty points over all windows: the deployability score (DS).
     pub penalty_points: f64,
@@ -141,7 +141,7 @@ pub struct SideScore {
     pub violations: ViolationCounts,
     /// Tier that follows from the penalty points.
     pub tier: Tier,
-    /// Number of faults.
+    /// Number of agent faults, such as missing or invalid answers.
     pub faults: u32,
     /// Number of answers that were too late to take effect.
     pub late_answers: u32,
@@ -154,7 +154,7 @@ pub struct SideScore {
     pub forfeit: Option<ForfeitCause>,
 }
 
-/// Penalty points of one window. As in an episode, a fault gives the full penalty for computation time.
+/// Penalty points of one window. As in an episode, an agent fault gives the highest penalty for computation time.
 #[must_use]
 pub fn window_penalty(window: &GameWindow) -> f64 {
     violation_points(&window.violations) + time_or_fault_points(window)
