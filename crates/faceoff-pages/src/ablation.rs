@@ -1,4 +1,4 @@
-//! `/submissions/{id}/ablation`: the effect of each *perturbation*, a disturbance of the simulation such as sensor noise, on an agent: as
+//! `/submissions/{id}/ablation`: an ablation, the effect of each *perturbation*, a disturbance of the simulation such as sensor noise, on an agent: as
 //! a chart, as a table, and as the episodes with another outcome. A *profile* is a set of perturbations.
 
 pub(super) mod pair;
@@ -106,9 +106,9 @@ pub(super) async fn page(
         AblationStatus::Unfinished { .. } | AblationStatus::Failed { .. } => Vec::new(),
     };
     let competition = app.config.competition();
-    let ablated = competition.ablation_profiles();
-    let ablated = ablated.filter_map(|profile| competition.profile(profile));
-    let legend: Vec<String> = ablated
+    let profiles = competition.ablation_profiles();
+    let profiles = profiles.filter_map(|profile| competition.profile(profile));
+    let legend: Vec<String> = profiles
         .map(|info| format!("{}: {}", info.letter, info.title))
         .collect();
     let clips = AblationClips::load(&app, viewer?, id).await?;
