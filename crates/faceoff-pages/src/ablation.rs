@@ -1,5 +1,6 @@
-//! `/submissions/{id}/ablation`: an ablation, the effect of each *perturbation*, a disturbance of the simulation such as sensor noise, on an agent: as
-//! a chart, as a table, and as the episodes with another outcome. A *profile* is a set of perturbations.
+//! `/submissions/{id}/ablation`: an ablation, which measures the effect of each *perturbation* on an agent. A perturbation is a disturbance
+//! of the simulation, such as sensor noise; a *profile* is a set of perturbations. The page has a chart, a table, and the episodes that
+//! end with another outcome than in the ideal simulator.
 
 pub(super) mod pair;
 
