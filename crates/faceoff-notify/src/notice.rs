@@ -117,7 +117,7 @@ impl Notice {
         }
     }
 
-    /// Whether the notice is about this subject or a part of it: an evaluation is a part of its stage and of its day, for example.
+    /// Whether the notice is about this subject or a part of it. An evaluation, for example, is a part of its stage and of its day.
     pub(crate) fn is_about(&self, subject: Subject) -> bool {
         let is_part = match (subject, self.context) {
             (Subject::Team(team), _) => self.teams().contains(&team),
