@@ -37,7 +37,7 @@ pub struct LiveSubscription {
 /// A viewer's reading position in a game: an attempt and a number of its events. Later positions are greater.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct LiveCursor {
-    /// From 1.
+    /// Number of the attempt, from 1.
     pub attempt: u32,
     /// Number of events that were read.
     pub events: u32,
@@ -119,6 +119,7 @@ impl LiveGames {
         })
     }
 
+    /// Changes a running attempt and wakes its viewers. An attempt that has ended, or is not the newest one, does not change.
     fn update(&self, game: GameId, attempt: u32, change: impl FnOnce(&mut LiveAttempt)) {
         let Some(channel) = self.find(game) else {
             return;
@@ -144,7 +145,7 @@ impl LiveGames {
     }
 }
 
-/// Removes the oldest finished games, except the last [`MAX_FINISHED_LIVE_GAMES`].
+/// Removes finished games, the oldest first, until [`MAX_FINISHED_LIVE_GAMES`] of them are left.
 fn remove_oldest_finished(games: &mut VecDeque<GameChannel>) {
     let is_over = |channel: &watch::Sender<LiveAttempt>| channel.borrow().state.is_over;
     let mut excess = games
@@ -160,6 +161,7 @@ fn remove_oldest_finished(games: &mut VecDeque<GameChannel>) {
 }
 
 impl LiveAttempt {
+    /// Adds an event, and updates score and fouls by it.
     fn record(&mut self, event: LiveEvent) {
         match &event.event {
             GameEvent::Goal { score, .. } | GameEvent::Ended { score, .. } => {

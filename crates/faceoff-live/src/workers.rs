@@ -21,11 +21,11 @@ pub struct Workers(Arc<Mutex<WorkersState>>);
 #[derive(Debug, Default)]
 struct WorkersState {
     workers: BTreeMap<String, WorkerStatus>,
-    /// Operations that the server cannot do for remote workers, with the causes.
+    /// Operations that the server cannot do for remote workers, such as “publish jobs”, with the causes.
     problems: BTreeMap<String, String>,
     /// Files of leased jobs that are being uploaded or are closed, by the nonce (unique number) of the lease.
     files: HashMap<Uuid, JobFiles>,
-    /// Failures in a row, by worker.
+    /// Failures in a row, by worker; none after a success.
     failing: HashMap<String, Failures>,
     /// True if this process gives jobs to remote workers.
     are_enabled: bool,
@@ -96,7 +96,7 @@ pub struct WorkerStatus {
     pub first_seen_at: Timestamp,
     /// When it last contacted this process.
     pub last_seen_at: Timestamp,
-    /// Why it gets no jobs; `None` if it gets them.
+    /// Why the server gives it no jobs, such as another version of the program; `None` if it gets jobs.
     pub refusal: Option<String>,
     /// The slots that run a job, by name.
     pub busy_slots: BTreeMap<String, SlotStatus>,
@@ -230,8 +230,9 @@ impl Workers {
             return None;
         }
         let count = failures.jobs.len();
-        let excess = count.checked_sub(MAX_FAILURES)?;
-        let doublings = i32::try_from(excess.min(DOUBLINGS_TO_MAX)).unwrap_or_default();
+        let failures_beyond_first_backoff = count.checked_sub(MAX_FAILURES)?;
+        let doublings =
+            i32::try_from(failures_beyond_first_backoff.min(DOUBLINGS_TO_MAX)).unwrap_or_default();
         let backoff = (BACKOFF * 2_i32.pow(doublings.unsigned_abs())).min(MAX_BACKOFF);
         let backoff_until = now.saturating_add(backoff).unwrap_or(Timestamp::MAX);
         failures.backoff_until = Some(backoff_until);

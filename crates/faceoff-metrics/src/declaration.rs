@@ -1,4 +1,4 @@
-//! Creates a metric and registers it with its name and help text. The caller stores the returned clone.
+//! Creation of metrics. A new metric is registered with its name and help text, and the caller stores the returned clone.
 
 use prometheus_client::registry::{Metric, Registry, Unit};
 

@@ -35,18 +35,18 @@ pub struct GaugeValues {
 /// The queue of jobs: validation runs, parts of evaluations, and games.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Queue {
-    /// Jobs that a slot is running.
+    /// Number of jobs that run in a slot.
     pub running: u32,
-    /// Jobs that a slot can start.
+    /// Number of jobs that a free slot can start.
     pub waiting: u32,
-    /// Jobs that have repeatedly run out of disk space.
+    /// Number of jobs that have repeatedly run out of disk space, and wait for it.
     pub out_of_space: u32,
     /// Whether no job is started: paused by an organiser, or for lack of disk space.
     pub paused: bool,
     /// Waiting time of the oldest waiting job, seconds; 0 if none is waiting.
     pub oldest_wait_s: f64,
     /// Expected time until all open validation runs, and all open evaluations and games that count, have ended on the current
-    /// slots, seconds; NaN if unknown.
+    /// slots, seconds. NaN if no job of a queued kind was measured yet, or the queue is paused.
     pub expected_s: f64,
 }
 
@@ -163,7 +163,7 @@ const GAUGES: [Gauge; 16] = [
     },
     Gauge {
         name: "disk_size",
-        help: "Size of these disks",
+        help: "Size of the disks that the server writes to",
         unit: Some(Unit::Bytes),
         read: |values| disks(values, |disk| disk.size_bytes),
     },

@@ -31,6 +31,7 @@ const PREFIX: &str = "faceoff";
 #[derive(Clone)]
 pub struct Metrics {
     registry: Arc<Registry>,
+    /// Of HTTP requests.
     web: RequestMetrics,
     slots: SlotMetrics,
     events: Family<EventLabels, Counter>,

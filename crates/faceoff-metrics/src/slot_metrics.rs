@@ -34,8 +34,10 @@ pub struct SlotMetrics {
     episodes: Family<TaskLabels, Counter>,
     faults: Family<TaskLabels, Counter>,
     answer_times: Family<TaskLabels, Histogram, fn() -> Histogram>,
+    /// Round trips to a test agent that answers at once.
     round_trips: Family<RoundTripLabels, SecondsGauge>,
     max_host_interference: Family<SlotLabels, SecondsGauge>,
+    /// Episodes that were repeated because of host interference.
     reruns: Counter,
     stuck_count: Gauge,
     /// Names of the stuck slots' threads.
@@ -46,8 +48,9 @@ pub struct SlotMetrics {
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
 struct JobEndLabels {
-    /// Kind of the job.
+    /// Kind of the job. The label is part of the published metrics, and keeps its name.
     work: &'static str,
+    /// How the job ended.
     end: &'static str,
 }
 

@@ -33,7 +33,7 @@ impl Default for WebhookRules {
     }
 }
 
-/// What an address that is not public is instead.
+/// Why an address is not public.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum NotPublic {
     #[error("a loopback address")]
@@ -46,7 +46,7 @@ pub enum NotPublic {
     LinkLocal,
     #[error("a multicast or broadcast address")]
     Multicast,
-    /// Unassigned, or for documentation, benchmarks and translation.
+    /// Not assigned, or reserved for documentation, benchmarks or address translation.
     #[error("an address that is not assigned to any host on the Internet")]
     Reserved,
 }

@@ -62,13 +62,14 @@ struct ActiveDeliveries {
 }
 
 impl ActiveDeliveries {
+    /// Do the limits allow another delivery to this webhook?
     fn can_start(&self, webhook: &Webhook) -> bool {
-        let same_owner = self
+        let deliveries_of_owner = self
             .webhooks
             .values()
             .filter(|(_, team)| *team == webhook.team);
         self.webhooks.len() < MAX_CONCURRENT
-            && same_owner.count() < MAX_CONCURRENT_PER_OWNER
+            && deliveries_of_owner.count() < MAX_CONCURRENT_PER_OWNER
             && self.webhooks.values().all(|(id, _)| *id != webhook.id)
     }
 
@@ -171,18 +172,19 @@ impl Deliverer {
         let now = self.clock.now();
         for delivery in self.store.due_deliveries(now).await? {
             let webhook = match self.store.webhook(delivery.webhook).await {
+                // Removed since then.
                 Err(StoreError::NotFound(_)) => continue,
                 webhook => webhook?,
             };
             if !active.can_start(&webhook) {
                 continue;
             }
-            let owner = (webhook.id, webhook.team);
+            let webhook_and_owner = (webhook.id, webhook.team);
             let (deliverer, url) = (self.clone(), webhook.url);
-            let started = active.tasks.spawn(async move {
+            let task = active.tasks.spawn(async move {
                 deliverer.send(&url, delivery).await;
             });
-            active.webhooks.insert(started.id(), owner);
+            active.webhooks.insert(task.id(), webhook_and_owner);
         }
         if has_more {
             return Ok(Duration::ZERO);
@@ -199,7 +201,7 @@ impl Deliverer {
 
     /// Plans deliveries of the next page of the log, for all webhooks that have not seen it. True if there may be more.
     async fn plan(&self) -> Result<bool, StoreError> {
-        // By the id of the last event that the webhooks have seen.
+        // Webhooks by the id of the last event that they have seen: those at the same position get the same page.
         let mut by_position: BTreeMap<i64, Vec<Webhook>> = BTreeMap::new();
         for webhook in self.store.webhooks_with_new_events().await? {
             by_position.entry(webhook.seen).or_default().push(webhook);
@@ -228,6 +230,7 @@ impl Deliverer {
                 });
             }
         }
+        // If there was a page, another one may follow.
         let has_more = !planned.is_empty();
         if has_more {
             self.store

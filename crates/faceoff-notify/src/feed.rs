@@ -1,5 +1,5 @@
-//! The feed of the event log, page by page. Its *followers* are webhooks and clients of the API's event stream. Each page is
-//! read once for all of them.
+//! The feed of the event log: its events as notices, page by page. Its *followers* are webhooks and clients of the API's event
+//! stream. Each page is read once for all of them. The Atom feed of the pages does not use it.
 
 use crate::{boxed, notice::Notice, stage_visibility::StageVisibility};
 use faceoff_store::{Store, StoreError, Subject, SubjectContext};
@@ -26,8 +26,8 @@ pub struct Page {
     pub last_event: i64,
 }
 
-/// Reads the log. All waiting followers get the same cached page. A follower's only state is the id of the last event
-/// that it has seen.
+/// Reads the log for all followers. Those at the same position get the same cached page. A follower's only state is the id
+/// of the last event that it has seen.
 #[derive(Debug)]
 pub struct Feed {
     store: Store,

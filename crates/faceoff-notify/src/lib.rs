@@ -1,8 +1,8 @@
 //! Notifications: notices of changes, their visibility, and their delivery to webhooks.
 //!
 //! A notice names an event and its subject, so that a page or an API client knows what to reload. It contains no scores
-//! and no free texts. Visibility is decided in one file (`notice.rs`), for the API's event stream, webhooks and the
-//! feed.
+//! and no free texts. The API's event stream and webhooks follow the log through a [`Feed`]. What each reader may see is
+//! decided in one file, `notice.rs`.
 //!
 //! This crate handles no requests and changes nothing in a season. It does not trust the addresses of webhooks: names
 //! are resolved here, and only public addresses on the Internet are connected to.

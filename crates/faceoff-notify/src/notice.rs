@@ -16,7 +16,7 @@ pub enum Audience {
     Organiser,
 }
 
-/// An event of the log, with what its visibility depends on.
+/// An event of the log, with everything on which its visibility depends.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Notice {
     /// Id of the event; ids are ascending.
@@ -55,7 +55,7 @@ impl Notice {
         }
     }
 
-    /// Whether the notice concerns this team, which may see it before the public does.
+    /// Whether the notice concerns this team, so that the team sees it even if it is not public.
     fn is_own(&self, own_team: TeamId) -> bool {
         match self.context {
             // Platform faults are visible to organisers only.
@@ -117,7 +117,7 @@ impl Notice {
         }
     }
 
-    /// Whether the notice is about a subject or a part of it.
+    /// Whether the notice is about this subject or a part of it. An evaluation, for example, is a part of its stage and of its day.
     pub(crate) fn is_about(&self, subject: Subject) -> bool {
         let is_part = match (subject, self.context) {
             (Subject::Team(team), _) => self.teams().contains(&team),
@@ -160,22 +160,22 @@ impl Notice {
     #[must_use]
     pub fn json(&self) -> Value {
         let mut fields = Map::new();
-        let mut put = |name: &str, value: Value| {
+        let mut add_field = |name: &str, value: Value| {
             fields.insert(name.to_owned(), value);
         };
-        put("id", json!(self.id));
-        put("kind", json!(self.kind));
-        put("at", json!(self.at));
-        put("subject", json!(self.subject.to_string()));
+        add_field("id", json!(self.id));
+        add_field("kind", json!(self.kind));
+        add_field("at", json!(self.at));
+        add_field("subject", json!(self.subject.to_string()));
         let teams = self.teams();
         if !teams.is_empty() {
-            put("teams", json!(teams));
+            add_field("teams", json!(teams));
         }
         match self.context {
             SubjectContext::Stage { stage, day } => {
-                put("stage", json!(stage));
+                add_field("stage", json!(stage));
                 if let Some(day) = day {
-                    put("day", json!(day));
+                    add_field("day", json!(day));
                 }
             }
             SubjectContext::Evaluation {
@@ -184,16 +184,16 @@ impl Notice {
                 submission,
                 ..
             } => {
-                put("stage", json!(stage));
-                put("day", json!(day));
-                put("submission", json!(submission));
+                add_field("stage", json!(stage));
+                add_field("day", json!(day));
+                add_field("submission", json!(submission));
             }
             SubjectContext::Submission { submission, .. }
             | SubjectContext::Ablation { submission, .. } => {
-                put("submission", json!(submission));
+                add_field("submission", json!(submission));
             }
             SubjectContext::Tournament(tournament) | SubjectContext::Game { tournament, .. } => {
-                put("tournament", json!(tournament));
+                add_field("tournament", json!(tournament));
             }
             SubjectContext::Season
             | SubjectContext::Team(_)

@@ -66,7 +66,7 @@ impl fmt::Display for FilterItem {
     }
 }
 
-/// A filter. A notice has to match one of its items; a filter without items matches all notices.
+/// A filter of notices. A notice matches if it matches any of the items; a filter without items matches all notices.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct NoticeFilter(Vec<FilterItem>);
 

@@ -3,7 +3,7 @@
 use faceoff_store::{Event, Subject};
 use std::{fmt, str::FromStr};
 
-/// A part of the season whose changes can be followed.
+/// A part of the season whose changes can be followed. An event can belong to several topics.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Topic {
     /// The season itself, its terms and pauses of its queue.
@@ -14,7 +14,6 @@ pub enum Topic {
     Queue,
     /// Stages and their days.
     Stages,
-    /// Teams.
     Teams,
     Submissions,
     Evaluations,
@@ -25,7 +24,7 @@ pub enum Topic {
     People,
     /// Registrations of new teams.
     Registrations,
-    /// Trials and proposed re-evaluations, which do not count.
+    /// Trials, which never count, and proposed re-evaluations, which count once an organiser applies them.
     Proposals,
     /// Tournaments and their rounds.
     Tournaments,

@@ -1,5 +1,6 @@
-//! `/submissions/{id}/ablation`: the effect of each *perturbation*, a disturbance of the simulation such as sensor noise, on an agent: as
-//! a chart, as a table, and as the episodes with another outcome. A *profile* is a set of perturbations.
+//! `/submissions/{id}/ablation`: an ablation, which measures the effect of each *perturbation* on an agent. A perturbation is a disturbance
+//! of the simulation, such as sensor noise; a *profile* is a set of perturbations. The page has a chart, a table, and the episodes that
+//! end with another outcome than in the ideal simulator.
 
 pub(super) mod pair;
 
@@ -106,9 +107,9 @@ pub(super) async fn page(
         AblationStatus::Unfinished { .. } | AblationStatus::Failed { .. } => Vec::new(),
     };
     let competition = app.config.competition();
-    let ablated = competition.ablation_profiles();
-    let ablated = ablated.filter_map(|profile| competition.profile(profile));
-    let legend: Vec<String> = ablated
+    let profiles = competition.ablation_profiles();
+    let profiles = profiles.filter_map(|profile| competition.profile(profile));
+    let legend: Vec<String> = profiles
         .map(|info| format!("{}: {}", info.letter, info.title))
         .collect();
     let clips = AblationClips::load(&app, viewer?, id).await?;

@@ -21,7 +21,7 @@ use faceoff_service::{
 use faceoff_store::TokenFilter;
 use jiff::Timestamp;
 
-/// Number of tokens and sessions of which the ended ones are listed, the newest ones.
+/// How many of the newest tokens and sessions are searched for expired and revoked ones. All valid ones are listed.
 const MAX_LISTED: u32 = 100;
 
 #[derive(Template)]

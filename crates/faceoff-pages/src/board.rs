@@ -54,7 +54,7 @@ struct OverallPage {
     sort: Sort,
     /// Profile, episodes and rules of all rows; `None` if rows differ.
     conditions: Option<String>,
-    /// The earlier day to which changes are relative.
+    /// The earlier day to which changes of rank and score are relative.
     comparison_day: Option<jiff::civil::Date>,
     groups: Vec<Group<OverallRow>>,
     baselines: Vec<Baseline>,
@@ -62,7 +62,7 @@ struct OverallPage {
     disqualified: Vec<TeamView>,
     /// Above the newest board of the current stage with all teams; `None` above others.
     front: Option<FrontPage>,
-    /// For cards that show a link.
+    /// Text of the link preview that chats show.
     description: String,
     style: &'static str,
     score_history: Option<TeamsChart>,
@@ -103,7 +103,7 @@ impl Downloads {
 }
 
 impl OverallPage {
-    /// Do the rows stand below their tiers? Not if the table is sorted by another column, or the competition has no tiers.
+    /// Are the rows grouped by tier? Not if the table is sorted by another column, or the competition has no tiers.
     fn is_ranked_by_tier(&self) -> bool {
         self.groups.iter().any(|group| group.tier.is_some())
     }
@@ -115,7 +115,7 @@ impl OverallPage {
     }
 }
 
-/// What the page is about, for cards that show a link: who leads, then what the competition is.
+/// What the page is about, for link previews: who leads, then what the competition is.
 fn description(competition: &Competition, front: Option<&FrontPage>) -> String {
     let leader = front.and_then(|front| front.leader.as_ref());
     let leads = leader.map(|leader| format!("{} leads with {} %. ", leader.team, leader.score));
@@ -144,8 +144,8 @@ pub(super) async fn overall(
     let season = SeasonSummary::load(&app).await?;
     let mut board = board::query(&app, &visibility, query.board(), None).await?;
     sort.apply(&mut board.rows, None);
-    let today = app.store.stage(board.stage).await?;
-    let today = today.day(app.config.clock.now());
+    let stage = app.store.stage(board.stage).await?;
+    let today = stage.day(app.config.clock.now());
     let timeline = BoardTimeline::load(&app, &visibility, &board, query.live).await?;
     let days = Days::new(&board, &timeline, &address);
     let score_history =
@@ -188,7 +188,7 @@ pub(super) async fn overall(
     render_with_etag(&page)
 }
 
-/// Path of the picture for cards of the board, as visitors see it.
+/// Path of the picture for link previews of the board. It shows what visitors see, so it never includes results after a freeze.
 fn card_path(path: &str, query: &BoardPageQuery) -> String {
     let query = BoardPageQuery {
         live: false,
@@ -198,7 +198,7 @@ fn card_path(path: &str, query: &BoardPageQuery) -> String {
     with_query(path, &query)
 }
 
-/// What the picture shows.
+/// Text in place of the picture of the link preview.
 fn card_alt(board: &BoardView) -> String {
     format!(
         "The first teams of {}: rank, score and its interval",
@@ -218,12 +218,14 @@ struct TaskPage {
     aim: String,
     /// Elements of an SVG drawing; empty without one.
     drawing: String,
+    /// BLAKE3 hash of the season's secret, from which all episodes are drawn.
     commitment: String,
     styles: [&'static str; 2],
     score_history: Option<TeamsChart>,
     downloads: Downloads,
     /// Profile, episodes and rules of all rows; `None` if rows differ.
     conditions: Option<String>,
+    /// The earlier day to which changes are relative.
     comparison_day: Option<jiff::civil::Date>,
     /// Headings of the columns of violations.
     violation_columns: Vec<String>,

@@ -7,6 +7,7 @@ use faceoff_api::views::{
 };
 use faceoff_types::CountingResult;
 
+/// The phase of a stage in words. A closed stage is provisional until it is signed off.
 pub(super) const fn phase_label(phase: PhaseView, is_signed_off: bool) -> &'static str {
     match phase {
         PhaseView::Upcoming => "upcoming",
@@ -25,7 +26,7 @@ pub(super) fn rows_caption(board: &BoardView) -> String {
     }
 }
 
-/// The rank of a row: that of the first one with `=` for teams that are statistically tied.
+/// The rank of a row as text. Statistically tied teams share the rank of the first one, with `=`, as in `2=`.
 pub(super) fn shared_rank(rows: &[BoardRow], row: &BoardRow) -> String {
     let tied = rows
         .iter()
@@ -54,7 +55,7 @@ fn counting_rule(board: &BoardView) -> String {
     }
 }
 
-/// Notice that only the final day counts, while the board shows other results.
+/// Notice that only the final day counts, while the rows still show results of other days.
 pub(super) fn final_day_notice(board: &BoardView) -> Option<&'static str> {
     (board.standings == CountingResult::Final && board.rows_by != CountingResult::Final)
         .then_some("Only the final day counts. The organisers start it after the stage has closed.")
@@ -79,10 +80,10 @@ pub(super) fn result_status(board: &BoardView) -> String {
         None => {
             "The result is provisional: it may change until the organisers sign it off.".to_owned()
         }
-        Some(done) => format!(
+        Some(sign_off) => format!(
             "The result was signed off on {} by {} and is final.",
-            utc_minute(done.at),
-            done.by
+            utc_minute(sign_off.at),
+            sign_off.by
         ),
     }
 }

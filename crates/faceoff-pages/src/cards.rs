@@ -1,5 +1,5 @@
-//! Pictures for cards that show a link, such as in a chat: `card.png` below the path of a page. They are public: for every caller a picture shows
-//! what a visitor without an account sees on the page. Only visitors who hide results get a game's picture without them.
+//! Cards: the pictures of link previews, as chats show them, at `card.png` below the path of a page. They are public: for every caller a
+//! picture shows what a visitor without an account sees on the page. Only visitors who hide results get a game's picture without them.
 
 mod board;
 mod episode;

@@ -63,6 +63,7 @@ struct Row {
 /// Episodes of a task that only one of the two teams solved.
 struct DifferingEpisodes {
     task: Task,
+    /// For each team: its name, and the episodes that only this team solved.
     sides: [(String, Vec<u32>); 2],
 }
 
@@ -76,8 +77,9 @@ impl DifferingEpisodes {
                 (view.b.team.to_string(), solved.only_b.clone()),
             ],
         };
-        let all = view.episodes.iter().flatten().map(task_episodes);
-        all.filter(|task| task.sides.iter().any(|(_, episodes)| !episodes.is_empty()))
+        let all_tasks = view.episodes.iter().flatten().map(task_episodes);
+        all_tasks
+            .filter(|task| task.sides.iter().any(|(_, episodes)| !episodes.is_empty()))
             .collect()
     }
 }

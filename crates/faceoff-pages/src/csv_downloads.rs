@@ -77,7 +77,7 @@ pub(super) async fn episodes(
     Ok(table.into_download("episodes.csv", query?.0.format))
 }
 
-/// `/evaluations/{id}/answer-times.csv`: number of control steps by answer time, for viewers of the dataset.
+/// `/evaluations/{id}/answer-times.csv`: number of control steps by answer time, for those who may see the dataset.
 pub(super) async fn answer_times(
     viewer: Result<Viewer, Problem>,
     State(app): State<App>,

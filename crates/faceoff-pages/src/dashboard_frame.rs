@@ -92,22 +92,22 @@ impl From<&Problem> for Refusal {
     }
 }
 
-/// A form without fields: its button says everything.
+/// A form with a button only.
 #[derive(Deserialize)]
 pub(super) struct EmptyForm {}
 
-/// Query of a redirect after a successful action.
+/// Query of the page to which a successful action redirects. `done` is a key of [`DONE_TEXTS`].
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(default)]
 pub(super) struct DoneQuery {
     pub(super) done: Option<String>,
 }
 
-/// Notice above the content of a page.
+/// Notice above the content of a page: about the last action, or about the submitted form.
 #[derive(Clone, Copy)]
 pub(super) enum Notice<'a> {
     None,
-    /// The action before the redirect, if there was one.
+    /// The successful action before the redirect to this page, if there was one.
     Done(&'a DoneQuery),
     /// The submitted form was refused.
     Refused(&'a Problem),

@@ -40,8 +40,8 @@ use serde::Deserialize;
 use std::sync::{Arc, OnceLock};
 use tokio::sync::Mutex;
 
-/// Browsers revalidate each page by its ETag, since the frame of a page shows problems of the server. It also names the signed-in user, so
-/// no page is kept for others.
+/// Browsers revalidate each page by its ETag, since the frame of a page shows problems of the server. The frame also names the signed-in
+/// user, so shared caches must not store pages.
 const CACHE_CONTROL: &str = "private, no-cache";
 /// Longest search query, in characters.
 const MAX_QUERY_CHARS: usize = 200;
@@ -116,13 +116,13 @@ pub(super) fn router(api: ApiDocument) -> Router<App> {
         .layer(Extension(documentation))
 }
 
-/// What every page of the documentation has.
+/// What every page of the documentation has beside its content: style, script, search field and list of pages.
 struct DocsHead<'a> {
     style: &'static str,
     script: &'static str,
     /// Text in the search field; empty except on the page of the results.
     search_query: String,
-    /// List of all pages; the contents page is such a list.
+    /// The list of all pages beside the page; `None` on the contents page, which is such a list itself.
     side: Option<SideList<'a>>,
 }
 
@@ -346,12 +346,12 @@ async fn search_page(
     // The first search builds the index, which takes CPU time. Searches run one at a time on a blocking thread, so that they do
     // not delay other requests.
     let guard = Arc::clone(&documentation.search_lock).lock_owned().await;
-    let searched = Arc::clone(&documentation);
+    let search_documentation = Arc::clone(&documentation);
     let query = search_query.clone();
     let search = tokio::task::spawn_blocking(move || {
         // Held until the search has ended, even if the visitor does not wait for it.
         let _guard = guard;
-        searched.index().search(&query)
+        search_documentation.index().search(&query)
     });
     let found = search.await.map_err(Problem::internal)?;
     respond(

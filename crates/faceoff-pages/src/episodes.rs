@@ -58,7 +58,7 @@ struct Page {
     outcomes: Vec<SelectOption>,
     violated: Vec<SelectOption>,
     ends: Vec<SelectOption>,
-    /// Are positions on the table known?
+    /// Are positions on the table known? Only then are maps shown.
     has_table: bool,
     table: TableOutline,
     start_maps: Vec<StartMap>,
@@ -84,19 +84,19 @@ pub(super) async fn page(
             format!("unknown value of {field:?}; use the filter on the page of the episodes");
         Problem::new(ProblemKind::InvalidRequest, detail)
     };
-    let chosen = query.filter().map_err(invalid)?;
+    let filter = query.filter().map_err(invalid)?;
     let competition = app.config.competition();
-    if let Some(task) = chosen.task {
-        let found = competition.find_task(task.as_str());
-        found.map_err(|_| invalid("task"))?;
+    if let Some(task) = filter.task {
+        let known = competition.find_task(task.as_str());
+        known.map_err(|_| invalid("task"))?;
     }
-    if let Some(ViolatedLimit::One(name)) = chosen.violated
+    if let Some(ViolatedLimit::One(name)) = filter.violated
         && !competition.world_violations().any(|known| known == name)
     {
         return Err(invalid("violated").into());
     }
     let ends = &competition.ends;
-    if let Some(end) = chosen.end
+    if let Some(end) = filter.end
         && !ends.iter().any(|info| info.end == end)
     {
         return Err(invalid("end").into());
@@ -109,21 +109,21 @@ pub(super) async fn page(
     let task_episodes: Vec<_> = view
         .episodes
         .iter()
-        .filter(|summary| chosen.task.is_none_or(|task| task == summary.task))
+        .filter(|summary| filter.task.is_none_or(|task| task == summary.task))
         .collect();
     let matching: Vec<_> = task_episodes
         .iter()
         .copied()
-        .filter(|summary| chosen.matches(summary))
+        .filter(|summary| filter.matches(summary))
         .collect();
     let pages = matching.len().div_ceil(ROWS_PER_PAGE).max(1);
     let page = usize::try_from(query.page.unwrap_or(1)).unwrap_or(usize::MAX);
     let page = page.clamp(1, pages);
-    let first = (page - 1) * ROWS_PER_PAGE;
+    let first_index = (page - 1) * ROWS_PER_PAGE;
     let still_version = still::version(&clips.file);
     let rows: Vec<Row> = matching
         .iter()
-        .skip(first)
+        .skip(first_index)
         .take(ROWS_PER_PAGE)
         .map(|summary| Row::new(competition, id, summary, &still_version))
         .collect();
@@ -142,11 +142,11 @@ pub(super) async fn page(
     };
     let is_played = |task: &Task| view.episodes.iter().any(|summary| summary.task == *task);
     let tasks = competition.task_names().filter(is_played);
-    let any = ("any".to_owned(), "any limit".to_owned());
-    let kinds = competition
+    let any_limit = ("any".to_owned(), "any limit".to_owned());
+    let single_limits = competition
         .world_violations()
         .map(|name| (name.to_string(), competition.violation_title(name)));
-    let late = clips
+    let late_answer = clips
         .can_see_observations
         .then(|| ("late".to_owned(), "a late answer".to_owned()));
     render(&Page {
@@ -174,9 +174,9 @@ pub(super) async fn page(
         outcomes: [("success", "success"), ("failure", "no success")]
             .map(|(value, label)| option(&query.outcome, value, label))
             .into(),
-        violated: std::iter::once(any)
-            .chain(kinds)
-            .chain(late)
+        violated: std::iter::once(any_limit)
+            .chain(single_limits)
+            .chain(late_answer)
             .map(|(value, label)| option(&query.violated, &value, &label))
             .collect(),
         ends: ends
@@ -190,8 +190,8 @@ pub(super) async fn page(
             .filter_map(|task| StartMap::new(task, &matching))
             .collect(),
         violations: ViolationMap::new(&matching),
-        from: if rows.is_empty() { 0 } else { first + 1 },
-        to: first + rows.len(),
+        from: if rows.is_empty() { 0 } else { first_index + 1 },
+        to: first_index + rows.len(),
         rows,
         previous_page: (page > 1).then(|| other_page(page - 1)),
         next_page: (page < pages).then(|| other_page(page + 1)),

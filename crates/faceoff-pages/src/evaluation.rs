@@ -88,6 +88,7 @@ impl TaskFigures {
 
 /// Episodes with a kind of violation.
 struct ViolationFigures {
+    /// Their number, and their share of the task's episodes.
     share: String,
     /// Penalty points; `None` without violations.
     points: Option<String>,
@@ -104,15 +105,17 @@ impl ViolationFigures {
         let mut kinds: Vec<(&ViolationInfo, u32, f64)> = kinds
             .map(|info| {
                 let count = violations.get(info.name);
+                // `points` are the least and the most points of one episode with such a violation.
                 (info, count, f64::from(count) * info.points[1])
             })
             .collect();
-        // The cost of a late answer depends on its time, so the points of late answers are the remainder.
+        // Only late answers have a range of points, since their cost depends on their time. They get the points that the other
+        // kinds leave.
         let (late, others): (Vec<_>, Vec<_>) =
             kinds.iter_mut().partition(|(info, ..)| info.has_range());
-        let fixed: f64 = others.iter().map(|(.., points)| *points).sum();
+        let points_of_others: f64 = others.iter().map(|(.., points)| *points).sum();
         for (.., points) in late {
-            *points = (result.penalty_points - fixed).max(0.0);
+            *points = (result.penalty_points - points_of_others).max(0.0);
         }
         let figures = kinds.into_iter().map(|(_, count, points)| Self {
             share: format::count_with_share(count, result.episodes),
@@ -141,7 +144,7 @@ struct FinalResult {
     /// `None` in a competition without tiers.
     tier: Option<TierLabel>,
     tier_change: String,
-    /// Number of bootstrap resamples behind `tier_change`.
+    /// Number of random resamples of the episodes (bootstrap) from which `tier_change` was computed.
     resamples: u32,
     ruleset: String,
     seed: Option<String>,
@@ -167,6 +170,7 @@ struct OtherEvaluation {
 /// Formatted delays caused by the server: the *noise floor*, which every answer has, and *host interference*, single delays by other load
 /// on the machine.
 struct TimingFigures {
+    /// Round trips measured before the evaluation, and between its episodes.
     before: RoundTripFigures,
     during: RoundTripFigures,
     /// Longest delay by host interference; `None` if none was measured.
@@ -223,7 +227,7 @@ struct Page {
     /// Are episodes and replays visible?
     has_episodes: bool,
     has_replays: bool,
-    /// Text in place of a result.
+    /// The state of the evaluation as text, in place of a result.
     state: String,
     is_dataset_public: bool,
     dataset_removed: Option<DecisionView>,
@@ -258,6 +262,7 @@ pub(super) async fn page(
     let submission = submission::find(&app, view.submission).await?;
     let ablation = ablation::exists(&app, submission.id).await?;
     let scored_at = view.status.finished_at();
+    // The freeze of the boards that hides the result, because the evaluation finished after it.
     let frozen = scored_at.and_then(|scored_at| visibility.hiding_freeze(view.stage, scored_at));
     let clips = Clips::find(&app, &visibility, id).await.ok();
     let distributions = match &clips {
@@ -362,7 +367,7 @@ async fn comparable_evaluations(
     evaluation: &EvaluationView,
     seed: Option<Seed>,
 ) -> Result<Vec<OtherEvaluation>, PageProblem> {
-    let same_episodes = |other: &EvaluationView| {
+    let may_have_same_episodes = |other: &EvaluationView| {
         other.id != evaluation.id
             && other.voided.is_none()
             && other.profile == evaluation.profile
@@ -374,27 +379,28 @@ async fn comparable_evaluations(
         date: evaluation.day,
     };
     let same_day = evaluation::day_evaluations(app, visibility, day).await?;
-    let mut found = Vec::new();
+    let mut comparable = Vec::new();
     let is_shown = |view: &EvaluationView| {
         let scored_at = view.status.finished_at();
         scored_at.is_none_or(|scored_at| visibility.hiding_freeze(view.stage, scored_at).is_none())
     };
-    let shown = same_day.into_iter().filter(same_episodes).filter(is_shown);
+    let candidates = same_day.into_iter().filter(may_have_same_episodes);
+    let shown = candidates.filter(is_shown);
     for view in shown {
-        // An extra evaluation may have other episodes.
+        // The seed decides, since an extra evaluation may have other episodes.
         if let EvaluationStatus::Finished {
             result: Some(result),
             ..
         } = view.status
             && result.seed == seed
         {
-            found.push((result.score, view.team_name, view.id));
+            comparable.push((result.score, view.team_name, view.id));
         }
     }
-    found.sort_by(|(a_score, _, a_id), (b_score, _, b_id)| {
+    comparable.sort_by(|(a_score, _, a_id), (b_score, _, b_id)| {
         b_score.total_cmp(a_score).then_with(|| a_id.cmp(b_id))
     });
-    Ok(found
+    Ok(comparable
         .into_iter()
         .map(|(score, team, evaluation)| OtherEvaluation {
             team: team.to_string(),
@@ -407,7 +413,8 @@ async fn comparable_evaluations(
 /// Number of control steps by answer time.
 type Distributions = TaskMap<Vec<TimeBinView>>;
 
-/// Answer times of all tasks, if they are public.
+/// Chart of the answer times of all tasks; `None` before the day is released. A task has bars of its distribution only if the viewer may
+/// see its clips.
 fn answer_times(result: &ResultView, distributions: &Distributions) -> Option<AnswerTimeChart> {
     let tasks = result.tasks.iter();
     let summaries: Vec<TimeSummary> = tasks

@@ -21,14 +21,16 @@ use faceoff_service::{
 };
 use std::time::Duration;
 
+/// Is it a form without files?
 fn is_text_form(headers: &HeaderMap) -> bool {
     let media_type = headers.get(header::CONTENT_TYPE);
     let media_type = media_type.and_then(|value| value.to_str().ok());
     media_type.is_some_and(|value| value.starts_with("application/x-www-form-urlencoded"))
 }
 
-/// Answers a dashboard's form without a valid session with the sign-in page, and a form that failed by a fault of the server with a page of
-/// that problem. Both keep the form. Forms of other sites are not kept, and neither are files.
+/// A layer around the dashboards' forms. A form that is sent without a valid session is answered with the sign-in page; a form that
+/// failed by a fault of the server, with a page of that problem. Both pages keep what was typed. Forms of other sites are not kept, and
+/// neither are files.
 pub(super) async fn keep_form(
     State((app, time_limit)): State<(App, Duration)>,
     request: Request,
@@ -45,8 +47,8 @@ pub(super) async fn keep_form(
     };
     let (parts, body) = request.into_parts();
     let request = Request::from_parts(parts.clone(), body);
-    let read = tokio::time::timeout(time_limit, RawForm::from_request(request, &()));
-    let body = match read.await {
+    let read_form = tokio::time::timeout(time_limit, RawForm::from_request(request, &()));
+    let body = match read_form.await {
         Ok(Ok(RawForm(body))) => body,
         Err(_) => return PageProblem(timeouts::problem(time_limit)).into_response(),
         Ok(Err(rejection)) => {
@@ -55,12 +57,12 @@ pub(super) async fn keep_form(
             return PageProblem::from(problem).into_response();
         }
     };
-    let form = || {
+    let kept_form = || {
         let fields = serde_urlencoded::from_bytes(&body).unwrap_or_default();
         KeptForm::new(&path, fields)
     };
     if is_visitor() {
-        return match form() {
+        return match kept_form() {
             Some(form) => match sign_in::page_with_form(&app, form).await {
                 Ok(page) => (StatusCode::UNAUTHORIZED, page).into_response(),
                 Err(problem) => problem.into_response(),
@@ -72,10 +74,11 @@ pub(super) async fn keep_form(
     let response = next.run(request).await;
     let fault = match response.extensions().get::<ServerFault>() {
         Some(fault) => Some(fault.clone()),
+        // A response that timed out has no such extension.
         None => (response.status() == StatusCode::SERVICE_UNAVAILABLE)
             .then(|| ServerFault::of(&timeouts::problem(time_limit))),
     };
-    match fault.zip(form()) {
+    match fault.zip(kept_form()) {
         Some((fault, form)) => kept_form::page_after_fault(&app, form, fault, response),
         None => response,
     }

@@ -12,7 +12,7 @@ pub(super) struct Rate {
     /// Lower and upper bound in percent, one decimal.
     pub(super) low: String,
     pub(super) high: String,
-    /// Start and width of the interval and position of the rate, in percent of the bar.
+    /// In a bar from 0 to 100: start and width of the interval and position of the rate, in percent.
     pub(super) bar_from: String,
     pub(super) bar_width: String,
     pub(super) bar_rate: String,
@@ -100,7 +100,7 @@ pub(super) fn expiry_state(
     Some(format!("{state} {}", utc_minute(at)))
 }
 
-/// A detail of a problem as sentences, with a capital letter and a full stop. A field's name keeps its spelling, as in “closes_at: …”.
+/// The detail of an error as sentences, with a capital letter and a full stop. A field's name keeps its spelling, as in “closes_at: …”.
 pub(super) fn sentence(detail: &str) -> String {
     let first_word = detail.split(' ').next().unwrap_or_default();
     if first_word.ends_with(':') {

@@ -12,7 +12,7 @@ use faceoff_service::{
 use faceoff_types::Ruleset;
 use std::sync::atomic::Ordering;
 
-/// The picture on cards that show a link.
+/// The picture of link previews, the cards that chats show for a link.
 #[derive(Debug)]
 pub(super) struct CardPicture {
     pub(super) address: String,
@@ -43,24 +43,24 @@ pub(super) struct Frame {
     pub(super) signed_in: Option<SignedIn>,
     /// What agents do in this competition; `None` on pages that are the same for all competitions.
     pub(super) subject: Option<String>,
-    /// The picture on cards that show a link; `None` if the public address of the server is not configured.
+    /// The picture of link previews; `None` if the public address of the server is not configured.
     pub(super) card: Option<CardPicture>,
-    /// The page's own address, for cards and search engines; `None` without a public address, and on pages that have several.
+    /// The page's own address, for link previews and search engines; `None` without a public address, and on pages that have several.
     pub(super) address: Option<String>,
 }
 
 impl Frame {
-    /// The frame of a page that names the season.
+    /// The frame of a page that names the season. `current` is the path of the page; empty if no navigation entry leads to it.
     pub(super) async fn load(app: &AppState, current: impl Into<String>) -> Result<Self, Problem> {
         let season = SeasonSummary::load(app).await?;
         Ok(Self::for_app(app, season.name, current))
     }
 
-    /// The frame of a page with content from the store.
+    /// The frame of a page of this server's season. `season` is its name; empty on pages that do not load it.
     pub(super) fn for_app(app: &AppState, season: String, current: impl Into<String>) -> Self {
-        let short = app.store.free_space().is_short();
+        let is_disk_full = app.store.free_space().is_short();
         Self {
-            notice: short.then_some(
+            notice: is_disk_full.then_some(
                 "The disk of the server is almost full: the queue is paused and uploads are refused. Nothing is lost; \
                  evaluations resume automatically when there is enough space.",
             ),
@@ -78,7 +78,7 @@ impl Frame {
         .with_preview(app)
     }
 
-    /// With the picture of pages that have no own one.
+    /// Sets the picture for link previews of pages that have no own one.
     fn with_preview(self, app: &AppState) -> Self {
         let base = app.config.public_url.as_deref();
         Self {
@@ -91,7 +91,7 @@ impl Frame {
         }
     }
 
-    /// Sets the page's own picture for cards. `path`: a route of `cards.rs`; `alt`: what the picture shows.
+    /// Sets the page's own picture for link previews. `path`: a route of `cards.rs`; `alt`: what the picture shows.
     pub(super) fn with_card(self, app: &AppState, path: &str, alt: String) -> Self {
         let base = app.config.public_url.as_deref();
         Self {
@@ -113,7 +113,7 @@ impl Frame {
         }
     }
 
-    /// The frame of a page without content from the store.
+    /// The frame of a page without anything from the store, such as a page of an error.
     pub(super) fn new(season: String, current: impl Into<String>) -> Self {
         Self {
             season,
@@ -132,7 +132,7 @@ impl Frame {
         }
     }
 
-    /// The title, on cards that show a link, of pages that have no own one: the subject with a capital letter.
+    /// The title in link previews of pages that have no own one: the subject with a capital letter.
     pub(super) fn card_title(&self) -> String {
         format::capitalised(self.subject.as_deref().unwrap_or("competition"))
     }
@@ -151,8 +151,8 @@ impl Frame {
 
     /// Is the page at or below this navigation entry? The boards of the tasks are below the first entry.
     pub(super) fn is_at(&self, entry: &str) -> bool {
-        let below = if entry == "/" { "/tasks" } else { entry };
-        let rest = self.current.strip_prefix(below);
+        let subpages = if entry == "/" { "/tasks" } else { entry };
+        let rest = self.current.strip_prefix(subpages);
         self.current == entry || rest.is_some_and(|rest| rest.starts_with('/'))
     }
 }

@@ -79,7 +79,9 @@ struct Page {
     /// Is the game queued or running?
     is_open: bool,
     live: Option<LiveGame>,
+    /// Has the game a result, hidden or not?
     has_result: bool,
+    /// `None` if there is no result, or if it is hidden.
     result: Option<GameResult>,
     sections: Option<GameSections>,
     replay: Option<GameReplay>,
@@ -115,6 +117,7 @@ pub(super) async fn page(
     let view = game::find(&app, viewer, id).await?;
     let teams = view.sides.each_ref().map(|side| side.team_name.to_string());
     let is_hidden = spoilers.hides_results();
+    // What is `None` is not on the page.
     let (mut live, mut shown_result, mut sections, mut replay) = (None, None, None, None);
     match &view.status {
         GameStatus::Running { since, .. } if !is_hidden => {
@@ -124,7 +127,8 @@ pub(super) async fn page(
         }
         GameStatus::Played { result, .. } => {
             let clips = GameClips::find(&app, viewer, id).await.ok();
-            // A forfeited game is shorter than the rules say: its length would reveal the result.
+            // A forfeited game is shorter than the rules say. If results are hidden, the replay has the full length, since its own
+            // length would reveal the forfeit.
             let steps = match is_hidden {
                 true => full_game_steps(&app, view.tournament).await?,
                 false => result.steps,
@@ -241,12 +245,12 @@ fn purpose_text(purpose: &PurposeView) -> String {
             meeting,
             second_half,
         } => {
-            let half = if *second_half {
+            let game_of_pair = if *second_half {
                 ", second game of the pair"
             } else {
                 ""
             };
-            format!("Round {round}, matchday {matchday}, pairing {meeting}{half}")
+            format!("Round {round}, matchday {matchday}, pairing {meeting}{game_of_pair}")
         }
         PurposeView::Test { .. } => "Test game; it does not count".to_owned(),
         PurposeView::Friendly { .. } => "Friendly game; it does not count".to_owned(),

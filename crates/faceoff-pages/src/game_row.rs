@@ -8,7 +8,7 @@ use faceoff_types::{GameId, RoundNumber, TeamId, TeamName};
 pub(super) struct GameRow {
     pub(super) id: GameId,
     pub(super) round: RoundNumber,
-    /// Number of the matchday in the round; a team has one opponent per matchday.
+    /// Number of the matchday in the round. On a matchday each team meets one opponent, or has a bye.
     pub(super) matchday: u32,
     /// Is it the second game of a mirrored pair, two games with the same seed and swapped sides?
     pub(super) is_second_of_pair: bool,
@@ -26,7 +26,7 @@ pub(super) enum GameState {
     Queued,
     Running,
     Played {
-        /// With points for fouls.
+        /// Goals, and a point for every third foul of the opponent.
         score: [u32; 2],
         /// Index of the winning side; `None` for a draw.
         winner: Option<usize>,
@@ -40,9 +40,16 @@ pub(super) enum GameState {
     Cancelled,
 }
 
+/// Does a page show the results of games? Visitors can choose to hide them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum ResultDisplay {
+    Shown,
+    Hidden,
+}
+
 impl GameRow {
-    /// The row of a game of a round; `None` for other games. `is_hidden`: without the result.
-    pub(super) fn new(view: &GameView, is_hidden: bool) -> Option<Self> {
+    /// The row of a game of a round; `None` for test games, friendly games and repetitions of the schedule.
+    pub(super) fn new(view: &GameView, results: ResultDisplay) -> Option<Self> {
         let PurposeView::Round {
             round,
             matchday,
@@ -59,8 +66,8 @@ impl GameRow {
             round,
             matchday,
             is_second_of_pair: second_half,
-            state: game_state(&view.status, &teams, is_hidden),
-            summary: summary(&view.status, is_hidden),
+            state: game_state(&view.status, &teams, results),
+            summary: summary(&view.status, results),
             departed_team: view.excluded_by.clone(),
             team_ids: sides.map(|side| side.team),
             teams,
@@ -96,7 +103,8 @@ impl GameRow {
     }
 }
 
-fn game_state(status: &GameStatus, teams: &[TeamName; 2], is_hidden: bool) -> GameState {
+fn game_state(status: &GameStatus, teams: &[TeamName; 2], results: ResultDisplay) -> GameState {
+    let is_hidden = results == ResultDisplay::Hidden;
     match status {
         GameStatus::Queued => GameState::Queued,
         GameStatus::Running { .. } => GameState::Running,
@@ -114,7 +122,8 @@ fn game_state(status: &GameStatus, teams: &[TeamName; 2], is_hidden: bool) -> Ga
     }
 }
 
-fn summary(status: &GameStatus, is_hidden: bool) -> String {
+fn summary(status: &GameStatus, results: ResultDisplay) -> String {
+    let is_hidden = results == ResultDisplay::Hidden;
     match status {
         GameStatus::Queued => "waiting for a free slot".to_owned(),
         GameStatus::Running { since, .. } => format!("running since {}", utc_minute(*since)),

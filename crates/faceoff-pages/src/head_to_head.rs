@@ -66,7 +66,7 @@ struct Page {
     tournament_name: String,
     ids: [TeamId; 2],
     names: [TeamName; 2],
-    /// Number of games that count.
+    /// Number of played games that count. Those that the departure of a team excluded from the standings do not.
     counted: usize,
     statistics: Vec<Statistic>,
     games: Vec<GameRow>,
@@ -96,19 +96,19 @@ pub(super) async fn page(
     let rules = &state.tournament.rules;
     let has_both_teams = |row: &GameRow| teams.iter().all(|team| row.team_ids.contains(team));
     let mut has_hidden_rounds = false;
-    let mut found = Vec::new();
+    let mut common_games = Vec::new();
     for view in &views {
-        let Some(row) = GameRow::new(view, spoilers.hides_results()) else {
+        let Some(row) = GameRow::new(view, spoilers.result_display()) else {
             continue;
         };
         // Even the fact that the teams met would reveal results of earlier rounds.
         if is_drawn_from_results(rules, row.round) && !spoilers.shows_round(row.round) {
             has_hidden_rounds = true;
         } else if has_both_teams(&row) {
-            found.push((row, view));
+            common_games.push((row, view));
         }
     }
-    let played: Vec<(&GameRow, &GameResultView)> = found
+    let played: Vec<(&GameRow, &GameResultView)> = common_games
         .iter()
         .filter(|_| !spoilers.hides_results())
         .filter_map(|(row, view)| match &view.status {
@@ -132,7 +132,7 @@ pub(super) async fn page(
             .iter()
             .map(|(row, result)| GameStatistics::new(row, result, teams[0]))
             .collect(),
-        games: found.iter().map(|(row, _)| row.clone()).collect(),
+        games: common_games.iter().map(|(row, _)| row.clone()).collect(),
         has_mirrored_pairs: rules.mirrored,
         names,
         has_hidden_rounds,
@@ -151,8 +151,8 @@ fn statistics(played: &[(&GameRow, &GameResultView)], names: &[TeamName; 2]) -> 
             .map(|(row, result)| value(result, side_of(row, &names[team])))
             .sum()
     };
-    let both = |value: &dyn Fn(&GameResultView, usize) -> f64| [sum(0, value), sum(1, value)];
-    let whole = |sums: [f64; 2]| sums.map(|sum| format!("{sum:.0}"));
+    let sums = |value: &dyn Fn(&GameResultView, usize) -> f64| [sum(0, value), sum(1, value)];
+    let whole_numbers = |values: [f64; 2]| values.map(|value| format!("{value:.0}"));
     let won = |team: usize| {
         let won = played
             .iter()
@@ -161,35 +161,36 @@ fn statistics(played: &[(&GameRow, &GameResultView)], names: &[TeamName; 2]) -> 
     };
     let drawn = played.iter().filter(|(_, result)| result.winner.is_none());
     let drawn = drawn.count().to_string();
-    // Games are weighted by control steps: a game has about one answer per step.
+    // The mean over all answers: games are weighted by control steps, since a game has about one answer per step.
     let steps: f64 = played
         .iter()
         .map(|(_, result)| f64::from(result.steps))
         .sum();
-    let mean = both(&|result, side| result.computation_time_s[side].mean * f64::from(result.steps));
+    let weighted_times =
+        sums(&|result, side| result.computation_time_s[side].mean * f64::from(result.steps));
     let statistic = |name, teams| Statistic { name, teams };
     vec![
         statistic("Games won", [won(0), won(1)]),
         statistic("Games drawn", [drawn.clone(), drawn]),
         statistic(
             "Goals on the table",
-            whole(both(&|result, side| f64::from(result.goals[side]))),
+            whole_numbers(sums(&|result, side| f64::from(result.goals[side]))),
         ),
         statistic(
             "Fouls",
-            whole(both(&|result, side| f64::from(result.fouls[side]))),
+            whole_numbers(sums(&|result, side| f64::from(result.fouls[side]))),
         ),
         statistic(
             "Penalty points",
-            both(&|result, side| result.penalty_points[side]).map(format::one_decimal),
+            sums(&|result, side| result.penalty_points[side]).map(format::one_decimal),
         ),
         statistic(
             "Faults",
-            whole(both(&|result, side| f64::from(result.faults[side]))),
+            whole_numbers(sums(&|result, side| f64::from(result.faults[side]))),
         ),
         statistic(
             "Mean computation time",
-            mean.map(|sum| format!("{} ms", format::milliseconds(sum / steps.max(1.0)))),
+            weighted_times.map(|sum| format!("{} ms", format::milliseconds(sum / steps.max(1.0)))),
         ),
     ]
 }

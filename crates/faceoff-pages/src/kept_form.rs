@@ -45,10 +45,11 @@ impl KeptField {
         format::capitalised(&self.name.replace('_', " "))
     }
 
-    /// Was it a hidden field? Ids, versions and the invitation of a user who returns are not typed.
+    /// Was it a hidden field, whose value the user did not type? Hidden are ids, versions, and the role `return`, the invitation with
+    /// which a user sets a new password.
     pub(super) fn is_hidden(&self) -> bool {
-        let is_return = self.name == "role" && self.value == "return";
-        is_return || self.name == "version" || self.value.parse::<Uuid>().is_ok()
+        let is_password_reset = self.name == "role" && self.value == "return";
+        is_password_reset || self.name == "version" || self.value.parse::<Uuid>().is_ok()
     }
 
     /// Is it a ticked checkbox?
@@ -71,7 +72,7 @@ impl KeptForm {
             .filter(|(name, _)| is_kept(name))
             .map(|(name, value)| KeptField { name, value })
             .collect();
-        // Forms require fields that may be empty, so those are kept with the others.
+        // The form is refused without any of its fields, so empty ones are kept with the others.
         let is_typed = fields.iter().any(|field| !field.value.is_empty());
         is_typed.then(|| Self {
             path: path.to_owned(),

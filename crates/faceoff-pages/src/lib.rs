@@ -1,6 +1,10 @@
 //! The pages: server-rendered, complete without JavaScript. One file per page; templates are in `web/templates`, styles in
 //! `web/static`, all compiled into the binary. Views are defined in [`faceoff_api::views`] and built in
 //! [`faceoff_service::views`].
+//!
+//! Modules that are no page: `cards` draws the pictures of link previews, as chats show them; `frame` is what all pages have around
+//! their content; `kept_form` keeps what was typed when a session expires; `page_auth` redirects visitors to the sign-in page;
+//! `spoilers` hides results of games on request. `…_text`, `…_row` and `format` make texts and rows for several pages.
 
 mod ablation;
 mod account;
@@ -71,7 +75,7 @@ use axum::{
 use faceoff_service::{api_document::ApiDocument, app::App, extract::MAX_JSON_BYTES, timeouts};
 use std::{sync::Arc, time::Duration};
 
-/// All pages and their assets. `time_limit` is the longest time of a request; `api` is the API's
+/// All pages and their assets. `time_limit` is the longest time of a request, uploads excepted; `api` is the API's
 /// OpenAPI document, which the documentation shows.
 pub fn router(app: &App, time_limit: Duration, api: ApiDocument) -> Router<App> {
     Router::new()
@@ -143,7 +147,7 @@ pub fn router(app: &App, time_limit: Duration, api: ApiDocument) -> Router<App> 
             time_limit,
             timeouts::time_out,
         ))
-        // Around the time limit: a form is kept after that, too.
+        // Around the time limit: the form of a request that timed out is kept, too.
         .layer(middleware::from_fn_with_state(
             (Arc::clone(app), time_limit),
             expired_session::keep_form,

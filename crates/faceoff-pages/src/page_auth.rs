@@ -29,7 +29,7 @@ pub(super) struct PageOrganiser {
 }
 
 pub(super) enum AuthRejection {
-    /// Redirect to the sign-in page, then back to this path.
+    /// Redirect to the sign-in page, and after signing in back to this path.
     SignIn(String),
     Problem(Problem),
 }
@@ -56,15 +56,16 @@ pub(super) fn return_path(path: &str) -> Option<&str> {
 
 /// `path` if it is at or below one of `allowed`.
 pub(super) fn return_path_below<'a>(allowed: &[&str], path: &'a str) -> Option<&'a str> {
-    let is_plain = path.bytes().all(|byte| byte.is_ascii_graphic()) && !path.contains('\\');
+    // Other characters could make a browser read the path as the address of another site.
+    let has_safe_chars = path.bytes().all(|byte| byte.is_ascii_graphic()) && !path.contains('\\');
     let is_allowed = allowed.iter().any(|prefix| {
         let rest = path.strip_prefix(prefix);
         rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(['/', '?']))
     });
-    (is_plain && is_allowed).then_some(path)
+    (has_safe_chars && is_allowed).then_some(path)
 }
 
-/// `path` if it is below a dashboard. Forms that are sent there are kept when the session has expired.
+/// `path` if it is at or below a dashboard. Forms that are sent there are kept when the session has expired.
 pub(super) fn form_path(path: &str) -> Option<&str> {
     return_path_below(&["/dashboard", "/organiser"], path)
 }
@@ -91,8 +92,10 @@ pub(super) fn redirect_to_sign_in(path: &str) -> Response {
 fn target_after_sign_in(parts: &Parts) -> String {
     let path = parts.uri.path();
     if parts.method.is_safe() {
-        let whole = parts.uri.path_and_query();
-        return whole.map_or(path, |whole| whole.as_str()).to_owned();
+        let path_and_query = parts.uri.path_and_query();
+        return path_and_query
+            .map_or(path, |path_and_query| path_and_query.as_str())
+            .to_owned();
     }
     form_page(path).to_owned()
 }

@@ -29,7 +29,7 @@ impl Page {
     /// Names of the tasks, each with the text that joins it to the one before: nothing, a comma, or “or”.
     fn tasks_of_seeds(&self) -> Vec<(&'static str, Task)> {
         let last = self.competition.tasks.len().saturating_sub(1);
-        let joined = |(index, task)| match index {
+        let with_separator = |(index, task)| match index {
             0 => ("", task),
             _ if index == last => (" or ", task),
             _ => (", ", task),
@@ -37,7 +37,7 @@ impl Page {
         self.competition
             .task_names()
             .enumerate()
-            .map(joined)
+            .map(with_separator)
             .collect()
     }
 
@@ -62,7 +62,7 @@ impl Page {
             .collect()
     }
 
-    /// A stage of an older version, whose id is not part of its seeds.
+    /// The name of a stage that an older version created: its id is not part of its seeds.
     fn stage_without_seed(&self) -> Option<&str> {
         let stage = self.season.stages.iter().find(|stage| !stage.names_seeds);
         stage.map(|stage| stage.name.as_str())

@@ -22,7 +22,7 @@ tokio::task_local! {
 /// The user who has sent a request for a page.
 enum CurrentUser {
     Known(SignedIn),
-    /// The database could not be read.
+    /// The request has a session, whose user could not be read from the database.
     Unknown,
 }
 
@@ -93,7 +93,7 @@ fn has_no_navigation(path: &str) -> bool {
     is_below(API_BASE) || is_below("/static") || path.ends_with(".svg")
 }
 
-/// Finds the signed-in user of a request for a page. The handler does not look up the session once more.
+/// A layer that finds the signed-in user of a request for a page. It passes the session on, so that the handler need not look it up again.
 pub async fn identify_viewer(State(app): State<App>, mut request: Request, next: Next) -> Response {
     if has_no_navigation(request.uri().path()) {
         return next.run(request).await;
@@ -101,7 +101,7 @@ pub async fn identify_viewer(State(app): State<App>, mut request: Request, next:
     let caller = match auth::session_caller(&app, request.headers()).await {
         Ok(Some(caller)) => caller,
         Ok(None) => return next.run(request).await,
-        // The page itself says what has failed.
+        // The handler meets the same error, and its page says what has failed.
         Err(_) => {
             return CURRENT_USER
                 .scope(CurrentUser::Unknown, next.run(request))

@@ -1,8 +1,9 @@
-//! Hiding results of games from visitors who want to watch a replay first. Visitors choose it with a form that posts to `/spoilers`;
-//! a cookie stores the choice, so that it works without an account.
+//! Spoilers are results of games that a visitor sees before watching the replay. Visitors choose to hide results with a form that posts
+//! to `/spoilers`; a cookie stores the choice, so that it works without an account.
 
 use super::{
     frame::PageProblem,
+    game_row::ResultDisplay,
     page_auth::{SPOILER_RETURN_PATHS, return_path_below},
 };
 use axum::{
@@ -40,12 +41,20 @@ pub(super) struct Spoilers {
 }
 
 impl Spoilers {
-    /// Are results hidden on this page?
+    /// Are results hidden on this page? The query can show the result of a game although the visitor hides results.
     pub(super) fn hides_results(&self) -> bool {
         self.are_hidden && self.show.as_deref() != Some(SHOW_RESULT)
     }
 
-    /// Are the pairings of a round visible that depend on results?
+    /// How lists of games on this page show results.
+    pub(super) fn result_display(&self) -> ResultDisplay {
+        match self.hides_results() {
+            true => ResultDisplay::Hidden,
+            false => ResultDisplay::Shown,
+        }
+    }
+
+    /// Are the pairings of this round visible, although they depend on results?
     pub(super) fn shows_round(&self, round: RoundNumber) -> bool {
         let shown = self
             .show

@@ -53,7 +53,7 @@ struct Page {
     open_evaluations: Vec<EvaluationView>,
     /// Visible to the team and organisers only.
     submissions: Option<Vec<SubmissionRow>>,
-    /// Query of the API for the same days.
+    /// Query with which the API returns the same days.
     history_query: String,
 }
 
@@ -75,18 +75,18 @@ pub(super) async fn page(
     history.rows.retain(|row| row.team_id == id);
     let stage = app.store.stage(history.stage).await?;
     let revisions = app.store.stage_revisions(stage.id).await?;
-    let rules = revisions
+    let revision = revisions
         .into_iter()
         .find(|revision| revision.number == history.revision)
         .ok_or_else(|| Problem::internal("history without its revision"))?;
-    let variation = rules.rules.variation;
+    let variation = revision.rules.variation;
     let bounds = app.config.competition().tier_bounds(&variation);
     let today: StageDay = stage.day(app.config.clock.now());
     let mut open_evaluations = evaluation::current(&app, &visibility, today).await?;
     open_evaluations.retain(|evaluation| evaluation.team == id && !evaluation.status.is_final());
     let sees_submissions = match viewer {
         Viewer::Organiser => true,
-        Viewer::Team(own) => own == id,
+        Viewer::Team(viewing_team) => viewing_team == id,
         Viewer::Visitor => false,
     };
     let submissions = match sees_submissions {

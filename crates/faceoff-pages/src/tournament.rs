@@ -74,7 +74,7 @@ struct ChampionShares {
 }
 
 impl Page {
-    /// The next step, without the reason of a pause if results are hidden: it is free text.
+    /// The next step. If results are hidden, it leaves out the reason of a pause: a free text that may reveal them.
     fn next_step(&self) -> &str {
         match self.spoilers.hides_results() && self.view.summary.paused.is_some() {
             true => "The tournament is paused; no games start.",
@@ -111,9 +111,9 @@ pub(super) async fn page(
     let is_hidden = spoilers.hides_results();
     let games: Vec<GameRow> = game::round_games(&state, viewer, None)?
         .iter()
-        .filter_map(|game| GameRow::new(game, is_hidden))
+        .filter_map(|game| GameRow::new(game, spoilers.result_display()))
         .collect();
-    let visible: Vec<&GameRow> = games
+    let visible_games: Vec<&GameRow> = games
         .iter()
         .filter(|game| !schedule::is_hidden(&view, game.round, &spoilers))
         .collect();
@@ -142,14 +142,14 @@ pub(super) async fn page(
         phase: tournament_text::phase_label(&view.summary),
         format: tournament_text::describe_format(&view.rules),
         is_final: view.summary.champion.is_some(),
-        running: visible
+        running: visible_games
             .iter()
             .filter(|game| game.is_running())
             .map(|game| GameRow::clone(game))
             .collect(),
         unplayed: unplayed.map(|entrant| entrant.team_name.clone()).collect(),
-        cross_tables: cross_tables(&state, &view, &visible, is_hidden)?,
-        pairs: pairs(id, &visible),
+        cross_tables: cross_tables(&state, &view, &visible_games, is_hidden)?,
+        pairs: pairs(id, &visible_games),
         rounds: view
             .rounds
             .iter()
@@ -171,13 +171,14 @@ pub(super) async fn page(
 
 async fn ratings_section(app: &App, view: &TournamentView) -> Result<RatingsSection, Problem> {
     let rated = match ratings(app, view.summary.id).await {
+        // There are no ratings; the problem says why.
         Err(problem) if problem.kind() == ProblemKind::Conflict => {
             return Ok(RatingsSection::None(problem.detail().to_owned()));
         }
         rated => rated?,
     };
-    let rounds = entrants::rounds_by_submission(view);
-    let tables = ratings::tables(&rated, &rounds);
+    let rounds_by_submission = entrants::rounds_by_submission(view);
+    let tables = ratings::tables(&rated, &rounds_by_submission);
     Ok(match tables.is_empty() {
         true => RatingsSection::None("No finished games yet.".to_owned()),
         false => RatingsSection::Tables(tables),
@@ -201,7 +202,7 @@ fn cross_tables(
                 .filter(move |game| game.round == round);
             matching.collect::<Vec<_>>()
         };
-        let own = match table.scope {
+        let table_games = match table.scope {
             TableScope::Tournament => games.to_vec(),
             TableScope::Group(_) => round_games(RoundNumber::FIRST),
             TableScope::Final => round_games(RoundNumber::SECOND),
@@ -211,15 +212,19 @@ fn cross_tables(
             Ok((id, standing.team.clone()))
         });
         let mut teams = ranked.collect::<Result<Vec<(TeamId, TeamName)>, Problem>>()?;
-        add_unranked(&mut teams, table.scope, &own);
+        add_unranked(&mut teams, table.scope, &table_games);
         if is_hidden {
             teams.sort_by(|(_, a), (_, b)| a.cmp(b));
         }
         // Pairings of hidden games are hidden, too.
-        if table.scope == TableScope::Final && own.is_empty() {
+        if table.scope == TableScope::Final && table_games.is_empty() {
             continue;
         }
-        cross_tables.push(CrossTable::new(standings::title(table.scope), &teams, &own));
+        cross_tables.push(CrossTable::new(
+            standings::title(table.scope),
+            &teams,
+            &table_games,
+        ));
     }
     cross_tables.retain(|table| table.rows.len() > 1);
     Ok(cross_tables)
@@ -229,9 +234,9 @@ fn cross_tables(
 fn pairs(id: TournamentId, games: &[&GameRow]) -> Vec<(String, String)> {
     let mut pairs = BTreeMap::new();
     for game in games {
-        let mut both: Vec<_> = game.teams.iter().zip(&game.team_ids).collect();
-        both.sort();
-        if let [(a, first), (b, second)] = both[..] {
+        let mut named_ids: Vec<_> = game.teams.iter().zip(&game.team_ids).collect();
+        named_ids.sort();
+        if let [(a, first), (b, second)] = named_ids[..] {
             let path = format!("/tournaments/{id}/teams/{first}/{second}");
             pairs.insert((a, b), (path, format!("{a} and {b}")));
         }
@@ -239,22 +244,22 @@ fn pairs(id: TournamentId, games: &[&GameRow]) -> Vec<(String, String)> {
     pairs.into_values().collect()
 }
 
-/// Appends teams that have a game but no rank yet.
+/// Appends teams that have a game but no rank yet. The standings of a group list all its teams from the start.
 fn add_unranked(teams: &mut Vec<(TeamId, TeamName)>, scope: TableScope, games: &[&GameRow]) {
     if matches!(scope, TableScope::Group(_)) {
         return;
     }
-    let mut others = Vec::new();
+    let mut unranked = Vec::new();
     for game in games {
         for (id, name) in game.team_ids.iter().zip(&game.teams) {
             let is_listed = |(other, _): &(TeamId, TeamName)| other == id;
-            if !teams.iter().any(is_listed) && !others.iter().any(is_listed) {
-                others.push((*id, name.clone()));
+            if !teams.iter().any(is_listed) && !unranked.iter().any(is_listed) {
+                unranked.push((*id, name.clone()));
             }
         }
     }
-    others.sort_by(|(_, a), (_, b)| a.cmp(b));
-    teams.extend(others);
+    unranked.sort_by(|(_, a), (_, b)| a.cmp(b));
+    teams.extend(unranked);
 }
 
 impl ChampionShares {

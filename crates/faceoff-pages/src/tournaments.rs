@@ -24,7 +24,7 @@ struct Page {
 }
 
 impl Page {
-    /// The next step of a tournament, without the reason of a pause if results are hidden: it is free text.
+    /// The next step of a tournament. If results are hidden, it leaves out the reason of a pause: a free text that may reveal them.
     fn next_step<'a>(&self, row: &'a Row) -> &'a str {
         match self.spoilers.hides_results() && row.summary.paused.is_some() {
             true => "The tournament is paused; no games start.",

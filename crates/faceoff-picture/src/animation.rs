@@ -52,11 +52,14 @@ impl Palette {
         bytes
     }
 
+    /// The index of the nearest colour.
     fn index(&mut self, colour: Colour) -> u8 {
         let colours = &self.colours;
         *self.nearest.entry(colour).or_insert_with(|| {
             let distances = colours.iter().map(|other| distance(*other, colour));
-            let nearest = (0_u8..=u8::MAX).zip(distances).min_by_key(|(_, far)| *far);
+            let nearest = (0_u8..=u8::MAX)
+                .zip(distances)
+                .min_by_key(|(_, distance)| *distance);
             nearest.map_or(0, |(index, _)| index)
         })
     }
@@ -71,6 +74,7 @@ fn blend(first: Colour, second: Colour, part: usize, parts: usize) -> Colour {
     })
 }
 
+/// How much two colours differ: the squared distance of their channels.
 fn distance(first: Colour, second: Colour) -> u32 {
     let squares = first.iter().zip(second).map(|(a, b)| {
         let difference = u32::from(a.abs_diff(b));
@@ -134,7 +138,7 @@ impl Animation {
             true => Region::all(self.size),
             false => Region::changed(&self.shown, &indices, columns),
         };
-        // Runs of unchanged pixels take little space.
+        // Pixels that have not changed get one index, since runs of the same index take little space.
         let unchanged = self.palette.unchanged();
         let shown = self
             .shown
@@ -219,6 +223,7 @@ impl Region {
         }
     }
 
+    /// The part of a frame inside the region.
     fn cut(self, indices: &[u8], columns: usize) -> Vec<u8> {
         let [left, width] = [self.left, self.width].map(usize::from);
         let lines = indices.chunks(columns);

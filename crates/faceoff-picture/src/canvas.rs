@@ -38,12 +38,12 @@ impl Drawing {
         );
     }
 
-    /// A text with its baseline at `position`.
+    /// Adds a text with its baseline at `position`.
     pub fn text(&mut self, text: &str, style: &TextStyle, position: [f64; 2], align: Align) {
         self.elements += &style.svg(text, position, align);
     }
 
-    /// SVG elements.
+    /// Adds SVG elements.
     pub fn elements(&mut self, svg: &str) {
         self.elements += svg;
     }

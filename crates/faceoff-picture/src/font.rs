@@ -15,7 +15,7 @@ const BOX_EM: [f64; 2] = [0.5, 0.7];
 /// Advance of such a box, in em.
 const BOX_ADVANCE_EM: f64 = 0.6;
 
-/// A character as the font draws it.
+/// How the font draws a character.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Shape {
     Glyph(GlyphId),

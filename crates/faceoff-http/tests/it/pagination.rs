@@ -28,8 +28,8 @@ async fn collect_pages(
     let mut path = path.to_owned();
     for page in 0.. {
         let answer = site.get(&path, token).await;
-        let rows = answer.json(200);
-        let rows = rows.as_array().unwrap();
+        let body = answer.json(200);
+        let rows = body.as_array().unwrap();
         found.extend(rows.iter().map(|row| string(&row[field])));
         match next_page(&answer) {
             Some(next) => path = next,
@@ -40,6 +40,7 @@ async fn collect_pages(
     found
 }
 
+/// For lists that do not change between two pages.
 async fn no_change(_: usize) {}
 
 #[tokio::test]
@@ -49,13 +50,13 @@ async fn pages_list_each_row_once_while_rows_are_added() {
     for name in names {
         site.team(name).await;
     }
-    let add = async |page: usize| {
+    let add_two_teams = async |page: usize| {
         // One name sorts before the rows that were read, one after them.
         site.team(&format!("A before {page}")).await;
         site.team(&format!("Zeta {page}")).await;
     };
     let path = "/api/v1/teams?limit=2";
-    let found = collect_pages(&site, path, Some(ADMIN), "name", add).await;
+    let found = collect_pages(&site, path, Some(ADMIN), "name", add_two_teams).await;
     let distinct: BTreeSet<&String> = found.iter().collect();
     assert_eq!(distinct.len(), found.len(), "{found:?}");
     for name in names {
@@ -71,7 +72,7 @@ async fn submissions_and_evaluations_are_listed_newest_first() {
     let site = Site::start().await;
     let [alpha, beta]: [TestTeam; 2] = [site.team("Alpha").await, site.team("Beta").await];
     let mut uploaded = Vec::new();
-    // All submissions have the same time stamp.
+    // The clock stands still, so all submissions have the same time stamp. Their ids decide the order.
     for _ in 0..5 {
         let path = site.valid_submission(&alpha, "a").await;
         uploaded.push(path.rsplit('/').next().unwrap().to_owned());
@@ -79,12 +80,13 @@ async fn submissions_and_evaluations_are_listed_newest_first() {
     site.valid_submission(&beta, "b").await;
     uploaded.reverse();
     let alpha_token = Some(alpha.token.as_str());
-    let add = async |_| {
+    // Newer rows are before those that were read, so they are not listed.
+    let add_submission = async |_| {
         site.valid_submission(&alpha, "a").await;
     };
     let path = "/api/v1/submissions?limit=2";
     assert_eq!(
-        collect_pages(&site, path, alpha_token, "id", add).await,
+        collect_pages(&site, path, alpha_token, "id", add_submission).await,
         uploaded
     );
 
@@ -92,25 +94,25 @@ async fn submissions_and_evaluations_are_listed_newest_first() {
         site.run_day_with_rates(&[0.5; 2]).await;
         site.next_day();
     }
-    let all = site.get("/api/v1/evaluations", alpha_token).await;
-    assert_eq!(next_page(&all), None);
-    let all: Vec<String> = all
+    let on_one_page = site.get("/api/v1/evaluations", alpha_token).await;
+    assert_eq!(next_page(&on_one_page), None);
+    let listed: Vec<String> = on_one_page
         .json(200)
         .as_array()
         .unwrap()
         .iter()
         .map(|row| string(&row["id"]))
         .collect();
-    assert_eq!(all.len(), 5);
-    let add = async |page| {
+    assert_eq!(listed.len(), 5);
+    let add_day = async |page| {
         if page == 0 {
             site.run_day_with_rates(&[0.5; 2]).await;
         }
     };
     let path = "/api/v1/evaluations?limit=2";
     assert_eq!(
-        collect_pages(&site, path, alpha_token, "id", add).await,
-        all
+        collect_pages(&site, path, alpha_token, "id", add_day).await,
+        listed
     );
     // The link to the next page keeps the other parameters.
     let filtered = "/api/v1/evaluations?day=2026-03-02&limit=1";
@@ -145,8 +147,8 @@ async fn growing_lists_are_paginated() {
         asked.json(201);
         organiser(site, title).await;
     }
-    let games = cup.games().await[0]["tournament"].clone();
-    let games = format!("/api/v1/tournaments/{}/games", string(&games));
+    let tournament = cup.games().await[0]["tournament"].clone();
+    let games = format!("/api/v1/tournaments/{}/games", string(&tournament));
     let lists = [
         "/api/v1/announcements",
         "/api/v1/questions",

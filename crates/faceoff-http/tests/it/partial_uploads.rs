@@ -1,4 +1,4 @@
-//! Tests of uploads in parts, and of uploads that are sent again.
+//! Tests of uploads in parts, which can go on after an interruption, and of uploads that are sent again with the same idempotency key.
 
 use crate::site::{Answer, GZIP, MAX_BUNDLE_BYTES, Site, TestTeam, string};
 use bytes::Bytes;
@@ -11,11 +11,12 @@ use std::{
     time::{Duration, SystemTime},
 };
 
-/// A bundle whose parts are sent.
+/// A bundle of a team that is sent in parts.
 struct Parts<'a> {
     site: &'a Site,
     token: String,
     bundle: Vec<u8>,
+    /// BLAKE3 hash of the bundle, which identifies the upload.
     hash: String,
 }
 
@@ -36,6 +37,7 @@ impl<'a> Parts<'a> {
         format!("/api/v1/uploads/{}", self.hash)
     }
 
+    /// A request, without a body yet, that sends the bytes from `offset` on.
     fn request(&self, offset: usize) -> reqwest::RequestBuilder {
         self.site
             .request(Method::PATCH, &self.path(), Some(&self.token))
@@ -77,6 +79,7 @@ impl<'a> Parts<'a> {
     }
 }
 
+/// The number of the team's submissions.
 async fn submissions(site: &Site, team: &TestTeam) -> usize {
     let list = site.get("/api/v1/submissions", Some(&team.token)).await;
     list.json(200).as_array().unwrap().len()
@@ -99,8 +102,8 @@ async fn parts_become_one_submission() {
     let early = parts.submit("key").await;
     early.problem(409, "conflict", &["4000 bytes", "send the missing ones"]);
     let other = site.team("Beta").await;
-    let foreign = site.get(&parts.path(), Some(&other.token)).await;
-    foreign.problem(404, "not-found", &[]);
+    let for_other_team = site.get(&parts.path(), Some(&other.token)).await;
+    for_other_team.problem(404, "not-found", &[]);
 
     // A restart of the server keeps what has arrived.
     let (token, bundle, hash) = (parts.token, parts.bundle, parts.hash);
@@ -125,26 +128,28 @@ async fn parts_become_one_submission() {
     let again = parts.submit("key").await;
     assert_eq!(again.json(201)["id"], submission["id"]);
     assert_eq!(again.header("location"), created.header("location"));
-    let unknown = parts.submit("other-key").await;
-    unknown.problem(404, "not-found", &["no part"]);
+    // With another key it would be another submission, whose parts are not there.
+    let without_parts = parts.submit("other-key").await;
+    without_parts.problem(404, "not-found", &["no part"]);
     assert_eq!(submissions(&site, &team).await, 1);
 }
 
 #[tokio::test]
-async fn broken_part_keeps_what_has_arrived() {
+async fn interrupted_part_keeps_what_has_arrived() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let parts = Parts::new(&site, &team, 7);
     let chunk = Bytes::copy_from_slice(&parts.bundle[..6000]);
     // The connection stays open without further bytes, as one whose client has disappeared.
-    let open = stream::iter([Ok::<_, std::io::Error>(chunk)]).chain(stream::pending());
-    let stalled = tokio::spawn(parts.request(0).body(Body::wrap_stream(open)).send());
+    let stalling_body = stream::iter([Ok::<_, std::io::Error>(chunk)]).chain(stream::pending());
+    let stalling_body = Body::wrap_stream(stalling_body);
+    let stalled = tokio::spawn(parts.request(0).body(stalling_body).send());
     while parts.state().await.status != 200 || parts.received_bytes().await != 6000 {
         tokio::time::sleep(Duration::from_millis(10)).await;
     }
     parts.send(6000, 10_000).await.json(200);
-    let taken_over = Answer::read(stalled.await.unwrap().unwrap()).await;
-    taken_over.problem(409, "conflict", &["newer connection"]);
+    let superseded = Answer::read(stalled.await.unwrap().unwrap()).await;
+    superseded.problem(409, "conflict", &["newer connection"]);
     parts.submit("key").await.json(201);
 }
 
@@ -153,6 +158,7 @@ async fn wrong_parts_are_refused_and_can_be_removed() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let mut parts = Parts::new(&site, &team, 7);
+    // The bundle no longer has the hash that the path names.
     parts.bundle[5000] = 8;
     parts.send(0, 10_000).await.json(200);
     parts
@@ -184,11 +190,12 @@ async fn wrong_parts_are_refused_and_can_be_removed() {
     let answer = site.get("/api/v1/uploads/zz", Some(&team.token)).await;
     answer.problem(400, "invalid-request", &["64 hexadecimal digits", "zz"]);
 
-    let text = Parts {
+    // The first part is refused already, by the first bytes of the bundle.
+    let no_archive = Parts {
         bundle: vec![b'x'; 10_000],
         ..Parts::new(&site, &team, 7)
     };
-    let answer = text.send(0, 9000).await;
+    let answer = no_archive.send(0, 9000).await;
     answer.problem(415, "unsupported-media-type", &["78787878"]);
 }
 
@@ -202,7 +209,7 @@ async fn old_partial_uploads_are_removed() {
     for (age_s, upload) in uploads.iter().enumerate() {
         upload.send(0, 5000).await.json(200);
         for file in upload.files() {
-            // Files get a time by the system's clock, the season has its own.
+            // Files get the time of the system's clock, but the season of the test has its own clock.
             let modified = SystemTime::from(site.now()) + Duration::from_secs(age_s as u64);
             if file.to_string_lossy().ends_with(&upload.hash) {
                 fs::File::open(&file)
@@ -219,6 +226,7 @@ async fn old_partial_uploads_are_removed() {
     );
     uploads[0].state().await.problem(404, "not-found", &[]);
     assert_eq!(uploads[3].received_bytes().await, 5000);
+    // Partial uploads of all teams expire after a day. The next upload in parts removes them.
     site.next_day();
     site.advance(60);
     let other = site.team("Beta").await;

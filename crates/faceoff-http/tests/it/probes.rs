@@ -106,7 +106,7 @@ async fn metrics_follow_events() {
     site.start_evaluation(&team, &submission).await;
     site.advance(90);
     let during = metrics().await;
-    // No job of this kind has run before, so its duration is unknown.
+    // No shard has run before, so the expected duration of the queue is unknown.
     assert!(metric(&during, "faceoff_queue_expected_seconds").is_nan());
     assert_eq!(metric(&during, "faceoff_remote_long_units"), 0.0);
     assert_eq!(metric(&during, "faceoff_evaluations_open"), 1.0);
@@ -114,8 +114,9 @@ async fn metrics_follow_events() {
     assert!(metric(&during, waiting) >= 1.0);
     assert_eq!(metric(&during, "faceoff_queue_oldest_wait_seconds"), 90.0);
     assert_eq!(metric(&during, "faceoff_queue_paused"), 0.0);
-    let pause = serde_json::json!({ "reason": "a test" });
-    site.post("/api/v1/queue/pause", Some(ADMIN), &pause).await;
+    let request = serde_json::json!({ "reason": "a test" });
+    site.post("/api/v1/queue/pause", Some(ADMIN), &request)
+        .await;
     assert_eq!(metric(&metrics().await, "faceoff_queue_paused"), 1.0);
     // The metrics contain no names and no ids.
     let after = metrics().await;

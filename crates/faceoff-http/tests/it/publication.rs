@@ -106,15 +106,16 @@ async fn team_publishes_its_dataset_after_the_release() {
         "not-yet",
         &["1 evaluations of 2026-03-01"],
     );
-    let running = site
+    let beta_evaluations = site
         .get("/api/v1/evaluations", Some(&beta.token))
         .await
         .json(200);
-    let running = format!(
-        "/api/v1/evaluations/{}/publish",
-        running[0]["id"].as_str().unwrap()
+    let beta_evaluation = format!(
+        "/api/v1/evaluations/{}",
+        beta_evaluations[0]["id"].as_str().unwrap()
     );
-    site.post(&running, Some(&beta.token), &json!({}))
+    let publish_queued = format!("{beta_evaluation}/publish");
+    site.post(&publish_queued, Some(&beta.token), &json!({}))
         .await
         .problem(409, "conflict", &["only a finished evaluation"]);
     site.finish_evaluation(&result([0.1, 0.2, 0.3], 10.0)).await;
@@ -124,10 +125,12 @@ async fn team_publishes_its_dataset_after_the_release() {
     post_publish(Some(ADMIN))
         .await
         .problem(403, "forbidden", &["team"]);
+    // Before it is public, other teams do not learn that the evaluation exists.
     post_publish(Some(&beta.token))
         .await
         .problem(404, "not-found", &[]);
     assert!(!is_public(&site, &path).await);
+    // To publish it once more is no error.
     for _ in 0..2 {
         assert_eq!(
             post_publish(Some(&alpha.token)).await.json(200)["public"],
@@ -139,12 +142,11 @@ async fn team_publishes_its_dataset_after_the_release() {
         .await
         .problem(403, "forbidden", &["belongs to another team"]);
     // The other team's dataset stays private.
-    let beta_evaluation = running.replace("/publish", "");
     assert!(!is_public(&site, &beta_evaluation).await);
 }
 
 #[tokio::test]
-async fn published_failure_hides_faults_and_log() {
+async fn public_failed_evaluation_hides_faults_and_log() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let submission = site.valid_submission(&team, "a").await;
@@ -152,6 +154,7 @@ async fn published_failure_hides_faults_and_log() {
         .await
         .json(200);
     let path = site.start_evaluation(&team, &submission).await;
+    // The plan of the run allows one agent fault, so two stop the evaluation.
     site.run_shards(2).await;
     let team_view = site.get(&path, Some(&team.token)).await.json(200);
     assert!(team_view["log"].as_str().unwrap().contains("log of"));

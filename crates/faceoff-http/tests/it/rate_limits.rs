@@ -119,6 +119,7 @@ async fn search_and_card_count_as_several_requests() {
         ..RateLimits::default()
     };
     let site = Site::start().await.with_rate_limits(rates).await;
+    // A search counts as 10 requests, a picture as 5. So of 1000 requests at once, at least this many are answered.
     for (path, address, least) in [
         ("/docs/search?q=puck", "192.0.2.1", 100),
         ("/card.png", "192.0.2.2", 200),

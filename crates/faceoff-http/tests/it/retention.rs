@@ -10,7 +10,8 @@ async fn stage_view(site: &Site) -> Value {
     site.get(&path, None).await.json(200)
 }
 
-/// Runs an evaluation day with this submission. Returns the API path of its evaluation. The clock is then on the next day.
+/// Runs an evaluation day with this submission, which gets these success rates in the three tasks. Returns the API path of its
+/// evaluation. The clock is then on the next day.
 async fn run_day(site: &Site, team: &TestTeam, submission: &str, rates: [f64; 3]) -> String {
     let evaluation = site.start_evaluation(team, submission).await;
     site.finish_evaluation(&result(rates, 10.0)).await;
@@ -32,6 +33,7 @@ async fn retention_is_confirmed_applied_and_reported() {
     for rate in [0.9, 0.1, 0.2] {
         evaluations.push(run_day(&site, &team, &submission, [rate; 3]).await);
     }
+    // The first evaluation is the best one, the third one the last. So this retention removes the dataset of the second one.
     let before = stage_view(&site).await;
     assert_eq!(before["retention"], json!({}));
     let request = json!({ "retention": { "last": 1 } });
@@ -113,6 +115,7 @@ async fn retention_is_confirmed_applied_and_reported() {
         .json(200);
     assert_eq!(changed["retention"], json!({}));
 
+    // The file of a removed dataset is deleted a day later, also for organisers.
     site.next_day();
     let removed = site.store.remove_files_of_removed(site.now()).await;
     assert_eq!(removed.unwrap(), 1);
@@ -203,7 +206,7 @@ async fn invalid_retention_is_refused_with_valid_values() {
 }
 
 #[tokio::test]
-async fn submission_without_bundle_cannot_be_deleted() {
+async fn unchecked_or_invalid_submission_cannot_be_deleted() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let uploaded = site.upload(&team.token, GZIP.to_vec()).await.json(201);
@@ -244,6 +247,7 @@ async fn deleted_submission_keeps_its_results() {
     let disposition = downloaded.header("content-disposition");
     assert!(disposition.ends_with(".tar.gz\""), "{disposition}");
 
+    // The active submission cannot be deleted. The second one becomes active instead.
     delete(&site, &submission, team_token, json!({}))
         .await
         .problem(409, "conflict", &["active", "withdraw"]);
@@ -341,6 +345,7 @@ async fn organiser_deletes_with_a_reason_but_not_evidence() {
     assert_eq!(reason, "by an organiser: it holds a virus");
     assert_eq!(deleted["deleted"]["by"], "organiser");
 
+    // The bundles of a disqualified team are kept.
     let disqualify = format!("/api/v1/teams/{}/disqualify", team.id);
     let decision = json!({ "reason": "it spied", "confirm": "Alpha" });
     site.post(&disqualify, Some(ADMIN), &decision)

@@ -26,6 +26,7 @@ async fn valid_submission(site: &Site, team: &TestTeam, runtime: &str) -> String
 async fn runtimes_of_open_stages_are_sent_to_validation_runs() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
+    // The runtimes that a new validation run gets, by stage. None are sent if an open stage accepts all runtimes.
     let sent_runtimes = async || {
         site.upload(&team.token, GZIP.to_vec()).await.json(201);
         let Job::Validation { runtimes, .. } = site.claim().await.job else {
@@ -55,13 +56,17 @@ async fn runtimes_of_open_stages_are_sent_to_validation_runs() {
             .await
             .json(201)
     };
-    let later = json!({ "name": "Late", "opens_at": "2026-05-01T00:00:00Z", "runtimes": null });
-    assert_eq!(create_stage(later).await.get("runtimes"), None);
-    let copied = json!({ "name": "Like", "opens_at": "2026-05-01T00:00:00Z" });
-    assert_eq!(create_stage(copied).await["runtimes"], changed["runtimes"]);
+    let upcoming_stage =
+        json!({ "name": "Late", "opens_at": "2026-05-01T00:00:00Z", "runtimes": null });
+    assert_eq!(create_stage(upcoming_stage).await.get("runtimes"), None);
+    let copying_stage = json!({ "name": "Like", "opens_at": "2026-05-01T00:00:00Z" });
+    assert_eq!(
+        create_stage(copying_stage).await["runtimes"],
+        changed["runtimes"]
+    );
     assert_eq!(sent_runtimes().await.len(), 1);
-    let second_open = json!({ "name": "Beside", "runtimes": ["native"] });
-    create_stage(second_open).await;
+    let second_open_stage = json!({ "name": "Beside", "runtimes": ["native"] });
+    create_stage(second_open_stage).await;
     assert_eq!(
         sent_runtimes().await.len(),
         2,

@@ -19,7 +19,7 @@ use serde_json::{Value, json};
 use std::{collections::BTreeMap, num::NonZero, sync::Arc};
 use tokio_util::sync::CancellationToken;
 
-/// Brakes in time, or stays where it is, or accelerates too much.
+/// An agent of three styles: “steady” brakes in time, “idle” does nothing, and “hasty” accelerates too much.
 const AGENT: &str = r#"
 import json, os, sys
 
@@ -161,29 +161,30 @@ async fn second_competition_runs_on_the_real_server() {
     site.start_day().await;
     let mut evaluations: Vec<EvaluationId> = Vec::new();
     for team in &teams {
-        let started = site.store.evaluations_of(team.id.parse().unwrap()).await;
-        let id = started.unwrap()[0].id;
+        let own_evaluations = site.store.evaluations_of(team.id.parse().unwrap()).await;
+        let id = own_evaluations.unwrap()[0].id;
         faceoff_testkit::wait_for_evaluation(&site.store, id).await;
         evaluations.push(id);
     }
 
-    // Ranked by score and penalty points, without tiers.
+    // The board ranks by score and penalty points, without tiers.
     let board = site.get("/api/v1/board", Some(ADMIN)).await.json(200);
     let rows = board["rows"].as_array().unwrap();
-    let row = |index: usize, field: &str| rows[index][field].clone();
-    let ranked: Vec<Value> = (0..3).map(|index| row(index, "team")).collect();
+    let cell = |index: usize, field: &str| rows[index][field].clone();
+    let ranked: Vec<Value> = (0..3).map(|index| cell(index, "team")).collect();
     assert_eq!(ranked, ["steady", "hasty", "idle"], "{board}");
     assert_eq!(
-        (row(0, "score"), row(0, "penalty_points")),
+        (cell(0, "score"), cell(0, "penalty_points")),
         (json!(100.0), json!(0.0))
     );
-    assert_eq!(row(2, "score"), 0.0);
+    assert_eq!(cell(2, "score"), 0.0);
     assert_eq!(rows[0].get("tier"), None);
     let violations = &rows[1]["tasks"]["settle"]["violations"];
     assert_eq!(violations, &json!({ "speeding": 6 }), "{board}");
-    assert_eq!(row(1, "penalty_points"), 2.0 * 6.0);
+    // Overall penalty points are the largest of the tasks: two points in each of the six episodes.
+    assert_eq!(cell(1, "penalty_points"), 2.0 * 6.0);
 
-    // Ablated: each profile is compared with the ideal one.
+    // An ablation compares each profile with the ideal one.
     let submission = site.store.evaluations_of(teams[2].id.parse().unwrap());
     let submission = submission.await.unwrap()[0].submission;
     let ablation = format!("/api/v1/submissions/{submission}/ablation");
@@ -202,15 +203,15 @@ async fn second_competition_runs_on_the_real_server() {
         .collect();
     assert_eq!(profiles, ["calm", "windy"], "{effects}");
 
-    // Browsed: boards, evaluation, team, episodes, season, stages, the form of a stage.
-    let shown = site.get("/", Some(ADMIN)).await.html(200);
-    let headings = texts(&shown, "main table th").join(" ");
+    // The pages show this competition, and no words of air hockey.
+    let board_page = site.get("/", Some(ADMIN)).await.html(200);
+    let headings = texts(&board_page, "main table th").join(" ");
     assert!(
         headings.contains("Reach") && headings.contains("Settle"),
         "{headings}"
     );
-    let of_task = site.get("/tasks/settle", Some(ADMIN)).await;
-    assert!(of_task.body.contains("too fast"), "{}", of_task.body);
+    let task_page = site.get("/tasks/settle", Some(ADMIN)).await;
+    assert!(task_page.body.contains("too fast"), "{}", task_page.body);
     let csv = site.get("/api/v1/board?format=csv", Some(ADMIN)).await;
     assert!(
         csv.body.contains("speeding") && !csv.body.contains("tier"),
@@ -230,7 +231,7 @@ async fn second_competition_runs_on_the_real_server() {
         let page = site.get(&path, Some(&teams[1].token)).await;
         page.html(200);
         let text = page.body.to_lowercase();
-        for foreign in [
+        for word in [
             "defend",
             "prepare",
             "puck",
@@ -239,7 +240,7 @@ async fn second_competition_runs_on_the_real_server() {
             "air hockey",
             "airhockey",
         ] {
-            assert!(!text.contains(foreign), "{foreign} is on {path}: {text}");
+            assert!(!text.contains(word), "{word} is on {path}: {text}");
         }
     }
     let path = format!("/evaluations/{evaluation}/episodes?violated=speeding&task=reach");
@@ -271,7 +272,7 @@ async fn second_competition_runs_on_the_real_server() {
     let names = &document["components"]["schemas"]["Task"]["enum"];
     assert_eq!(names, &json!(["reach", "settle"]));
 
-    // Recorded and verified.
+    // The dataset can be downloaded and verified.
     let path = format!("/api/v1/evaluations/{evaluation}/dataset");
     let request = site.request(reqwest::Method::GET, &path, Some(&teams[1].token));
     let bytes = request.send().await.unwrap().bytes().await.unwrap();

@@ -58,12 +58,12 @@ async fn seed_and_dataset_stay_secret_until_the_day_ends() {
     let secret = site.store.season().await.unwrap().secret;
     let today = jiff::civil::date(2026, 3, 1);
     let seed = secret.stage(site.stage().await).day(today);
-    let mut score = result([0.5, 0.6, 0.7], 100.0);
-    score.seed = seed;
-    site.finish_evaluation(&score).await;
+    let mut day_result = result([0.5, 0.6, 0.7], 100.0);
+    day_result.seed = seed;
+    site.finish_evaluation(&day_result).await;
     let dataset = format!("{first_evaluation}/dataset");
 
-    // The second team's evaluation is queued in the first iteration, and has been started in the second.
+    // The second team's evaluation is queued in the first iteration. In the second one it has been started: a shard was claimed.
     for _ in 0..2 {
         let events = site.store.events_after(0, 1000).await.unwrap();
         for token in [&*first.token, ADMIN] {
@@ -87,7 +87,7 @@ async fn seed_and_dataset_stay_secret_until_the_day_ends() {
         let (claim, ..) = site.claim_shard().await;
         site.store.release(&claim, site.now()).await.unwrap();
     }
-    site.finish_evaluation(&score).await;
+    site.finish_evaluation(&day_result).await;
     // The day is released by the end of its last evaluation, not by a request.
     let finished = site
         .get(&first_evaluation, Some(&first.token))
@@ -146,6 +146,7 @@ async fn faults_log_and_comparison_appear_with_the_release() {
     let [failing, early, late] = &paths[..] else {
         panic!("three evaluations")
     };
+    // The plan of the run allows one agent fault, so two stop the first evaluation.
     site.run_shards(2).await;
     site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
         .await;

@@ -175,14 +175,14 @@ async fn founder_names_the_team_and_foreign_forms_are_refused() {
     let fields = [("name", "Ada"), ("password", PASSWORD)];
     let nameless = browser.submit(&link, &fields).await;
     assert!(first_text(&nameless, "[role=alert]").contains("team's name"));
-    let foreign = browser
+    let request_of_other_site = browser
         .http
         .post(format!("{}{link}", site.url))
         .header("origin", "https://evil.example")
         .header("content-type", "application/x-www-form-urlencoded")
         .body("name=Eve");
-    let foreign = browser.send(foreign).await;
-    assert_eq!(foreign.status, 403);
+    let refused = browser.send(request_of_other_site).await;
+    assert_eq!(refused.status, 403);
     let invalid = [
         fields[0],
         fields[1],
@@ -217,12 +217,20 @@ async fn navigation_names_user_and_pending_decisions() {
         let page = Html::parse_document(&visitor.open(path).await.body);
         assert_eq!(texts(&page, entries).last().unwrap(), "Account", "{path}");
         let page = Html::parse_document(&ada.open(path).await.body);
-        let own = texts(&page, entries);
-        assert_eq!(own[own.len() - 2..], ["Dashboard", "Ada O'Neil"], "{path}");
+        let ada_entries = texts(&page, entries);
+        assert_eq!(
+            ada_entries[ada_entries.len() - 2..],
+            ["Dashboard", "Ada O'Neil"],
+            "{path}"
+        );
         assert!(links(&page, "header nav a").contains(&"/dashboard".to_owned()));
         let page = Html::parse_document(&grace.open(path).await.body);
-        let own = texts(&page, entries);
-        assert_eq!(own[own.len() - 2..], ["Dashboard", "Grace"], "{path}");
+        let grace_entries = texts(&page, entries);
+        assert_eq!(
+            grace_entries[grace_entries.len() - 2..],
+            ["Dashboard", "Grace"],
+            "{path}"
+        );
         assert!(links(&page, "header nav a").contains(&"/organiser".to_owned()));
     }
     let open = json!({ "takes_registrations": true });
@@ -259,7 +267,7 @@ async fn expired_session_keeps_the_typed_form() {
     let site = Site::start().await;
     let role = json!({ "role": "organiser", "note": "Grace" });
     let mut grace = Browser::join(&site, "Grace", role).await;
-    // Another browser's session ends.
+    // The cookie of a session that has ended.
     let expired = "faceoff_session=fo_session_0000";
     grace.cookie = Some(expired.to_owned());
     let text = "Line <1>\r\nline \"2\"";
@@ -292,9 +300,12 @@ async fn expired_session_keeps_the_typed_form() {
     // A wrong password loses nothing either.
     let wrong = send(&mut grace, "wrong").await;
     assert_eq!(wrong.status, 401);
-    let still = forms("/sign-in", &wrong).remove(0);
+    let form_after_refusal = forms("/sign-in", &wrong).remove(0);
     let kept = ("kept.title".to_owned(), "No day on Sunday".to_owned());
-    assert!(still.fields.contains(&kept), "{still:?}");
+    assert!(
+        form_after_refusal.fields.contains(&kept),
+        "{form_after_refusal:?}"
+    );
 
     let signed_in = send(&mut grace, PASSWORD).await;
     assert_eq!(signed_in.status, 200);
@@ -303,6 +314,7 @@ async fn expired_session_keeps_the_typed_form() {
         .into_iter()
         .find(|form| form.action == "/organiser/messages")
         .unwrap();
+    // Without the password and the confirmation, which are never kept.
     let names: Vec<&str> = form.fields.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(names, ["title", "text"]);
     let page = Html::parse_document(&signed_in.body);
@@ -418,7 +430,7 @@ async fn form_of_another_site_is_not_kept() {
     for answer in browser.submit_from_foreign_page(&form).await {
         assert!(!answer.body.contains("evil title"), "{}", answer.body);
     }
-    // A form that was kept leads to no other site either.
+    // Fields of the sign-in page that claim to be a kept form lead to no other site either.
     let fields = [("form", "https://evil.example/organiser"), ("kept.a", "b")];
     let role = json!({ "role": "organiser", "note": "Grace" });
     drop(Browser::join(&site, "Grace", role).await);

@@ -89,13 +89,13 @@ async fn signed_off_stage_does_not_change() {
     post_sign_off(confirmed)
         .await
         .problem(409, "conflict", &words);
-    let void = json!({ "reason": "why", "confirm": "Alpha" });
-    site.post(&format!("{path}/void"), Some(ADMIN), &void)
+    let void_evaluation = json!({ "reason": "why", "confirm": "Alpha" });
+    site.post(&format!("{path}/void"), Some(ADMIN), &void_evaluation)
         .await
         .problem(409, "conflict", &words);
-    let void = json!({ "reason": "why", "confirm": "2026-03-01" });
-    let void_day = format!("/api/v1/stages/{stage}/days/2026-03-01/void");
-    site.post(&void_day, Some(ADMIN), &void)
+    let void_day = json!({ "reason": "why", "confirm": "2026-03-01" });
+    let void_day_path = format!("/api/v1/stages/{stage}/days/2026-03-01/void");
+    site.post(&void_day_path, Some(ADMIN), &void_day)
         .await
         .problem(409, "conflict", &words);
     for body in [
@@ -107,6 +107,7 @@ async fn signed_off_stage_does_not_change() {
             .await
             .problem(409, "conflict", &words);
     }
+    // A later disqualification has no effect on the signed-off result.
     let disqualification = json!({ "reason": "why", "confirm": "Beta" });
     site.post(
         &format!("/api/v1/teams/{}/disqualify", beta.id),

@@ -66,7 +66,7 @@ pub struct Site {
     config: HttpConfig,
     /// The time of the server's clock.
     now: Arc<Mutex<Timestamp>>,
-    /// How far the system clock is ahead of the right time, for [`with_steady_clock`](Self::with_steady_clock).
+    /// How far the system clock is ahead of `now`; only a site [`with_steady_clock`](Self::with_steady_clock) notices it.
     system_ahead: Arc<Mutex<SignedDuration>>,
     http: reqwest::Client,
     server: JoinHandle<()>,
@@ -177,7 +177,7 @@ pub fn generous_limits() -> HttpLimits {
     }
 }
 
-/// Two runtimes that work, and one that is broken. A package name contains HTML, which pages must escape.
+/// Two runtimes that work, and one, “wrong”, that is broken. A package name contains HTML, which pages must escape.
 fn agent_resources() -> AgentResources {
     let python = PythonInventory {
         implementation: "CPython".into(),
@@ -432,7 +432,7 @@ impl Site {
         self.config.link_key.grant_key()
     }
 
-    /// A monitor that has not checked any day yet.
+    /// A monitor that warns if a day will not finish in time, and that has not checked any day yet.
     pub fn capacity_monitor(&self) -> CapacityMonitor {
         let HttpConfig {
             clock, capacity, ..
@@ -566,7 +566,8 @@ impl Site {
         }
     }
 
-    /// Runs the shards of the next evaluation (one of each task), with `faults` agent faults in each.
+    /// Runs the shards of the next evaluation (one of each task), with `faults` agent faults in each. The plan allows one fault, so with
+    /// more the first shard ends the evaluation as failed.
     pub async fn run_shards(&self, faults: usize) {
         for _ in TASKS {
             let (claim, run, shard) = self.claim_shard().await;
@@ -582,7 +583,7 @@ impl Site {
                 .await
                 .unwrap();
             if faults > 0 {
-                // The faults of one shard exceed those that the plan allows, so the evaluation has failed.
+                // The evaluation has failed, so its other shards do not run.
                 return;
             }
         }
@@ -706,7 +707,7 @@ impl Site {
         let stage = configure_stage(&self.store, &plan, None, self.now()).await;
         let started = self.store.start_day(Actor::Operator, stage, self.now());
         let started = started.await.unwrap();
-        let mut by_name = BTreeMap::new();
+        let mut ids_by_team = BTreeMap::new();
         for evaluation in &started {
             let name = self.store.team(evaluation.team).await.unwrap().name;
             let outcome_fn = teams
@@ -714,9 +715,9 @@ impl Site {
                 .find(|(new_name, _)| *new_name == name.as_str());
             let (_, outcome_fn) = outcome_fn.unwrap_or(&teams[0]);
             assert_eq!(self.run_evaluation(outcome_fn).await, evaluation.id);
-            by_name.insert(name.to_string(), evaluation.id);
+            ids_by_team.insert(name.to_string(), evaluation.id);
         }
-        teams.map(|(name, _)| by_name[name])
+        teams.map(|(name, _)| ids_by_team[name])
     }
 
     /// Publishes an announcement, which is an event of the kind `announced`.
@@ -740,7 +741,7 @@ impl Site {
         }
     }
 
-    /// Adds these teams, and evaluates a day with these results.
+    /// Adds these teams, and evaluates a day on which they get these results. All teams must be new.
     pub async fn add_ranked_teams(&self, teams: &[(&str, EvaluationResult)]) {
         for (name, _) in teams {
             let team = self.team(name).await;

@@ -64,6 +64,7 @@ async fn upload_quotas_are_those_of_the_open_stage() {
     upload()
         .await
         .problem(429, "too-many-pending", &["1 submissions"]);
+    // Without `waiting`, the server's limit of pending submissions applies. Two bundles of 4 bytes leave too few for a third.
     site.change_first_stage(json!({ "uploads": { "day_bytes": 10 } }))
         .await
         .json(200);

@@ -96,9 +96,9 @@ async fn stage_is_created_changed_and_evaluated() {
         ),
         (&json!("Finals"), 1)
     );
-    let first_board = format!("/api/v1/board?stage={}", site.stage().await);
-    let first_board = site.get(&first_board, None).await.json(200);
-    assert_eq!(first_board["rows"], json!([]));
+    let board_of_first_stage = format!("/api/v1/board?stage={}", site.stage().await);
+    let board_of_first_stage = site.get(&board_of_first_stage, None).await.json(200);
+    assert_eq!(board_of_first_stage["rows"], json!([]));
 }
 
 #[tokio::test]
@@ -109,8 +109,8 @@ async fn changed_rules_need_confirmation_and_have_their_own_board() {
         .await;
     let stage = site.get("/api/v1/stages", None).await.json(200)[0].clone();
     let new_rules = json!({ "episodes_per_task": 9 });
-    let problem = change_stage(&site, &stage, new_rules).await;
-    let problem = problem.problem(
+    let unconfirmed = change_stage(&site, &stage, new_rules).await;
+    let problem = unconfirmed.problem(
         409,
         "not-confirmed",
         &["revision 2", "empty board", "confirm"],
@@ -164,7 +164,7 @@ async fn changed_rules_need_confirmation_and_have_their_own_board() {
 #[tokio::test]
 async fn stage_keeps_its_ruleset_until_its_rules_change() {
     let site = Site::start().await;
-    // The change stores the stage as a server with the previous ruleset would have stored it.
+    // Stores the stage as a server of an earlier version would have, whose newest ruleset was the previous one.
     change_rules(&site.store, site.stage().await, site.now(), |rules| {
         rules.ruleset = faceoff_airhockey::RULESETS[1];
     })
@@ -250,6 +250,7 @@ async fn started_stage_refuses_most_changes() {
         [&json!(1), &json!("2026-03-02T12:00:00Z"), &json!(9)]
     );
 
+    // Once a day has started, the zone is fixed, since days are dates in that zone. Once closed, the stage is fixed.
     site.post("/api/v1/days", Some(ADMIN), &json!({ "stage": open["id"] }))
         .await
         .json(200);

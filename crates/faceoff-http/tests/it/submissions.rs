@@ -104,6 +104,7 @@ async fn newest_valid_submission_is_active_until_another_is_chosen() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let token = Some(team.token.as_str());
+    // The path of the only active submission.
     let active = async || {
         let list = site.get("/api/v1/submissions", token).await.json(200);
         let list = list.as_array().unwrap().clone();
@@ -121,15 +122,15 @@ async fn newest_valid_submission_is_active_until_another_is_chosen() {
     let first = site.valid_submission(&team, "first").await;
     assert_eq!(active().await, first);
     site.advance(1);
-    let waiting = string(&site.upload(&team.token, GZIP.to_vec()).await.json(201)["id"]);
-    let activate = format!("/api/v1/submissions/{waiting}/activate");
+    let second = string(&site.upload(&team.token, GZIP.to_vec()).await.json(201)["id"]);
+    let activate = format!("/api/v1/submissions/{second}/activate");
     site.post(&activate, token, &json!({}))
         .await
         .problem(409, "conflict", &["wait"]);
     assert_eq!(active().await, first);
     let outcome = valid_outcome("native", "second", "");
     site.finish_validation(outcome).await;
-    assert!(active().await.ends_with(&waiting));
+    assert!(active().await.ends_with(&second));
 
     site.advance(1);
     let activated = site
@@ -204,11 +205,11 @@ async fn upload_that_is_no_archive_is_refused() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let upload = |body: Vec<u8>| site.upload(&team.token, body);
-    let kind = "unsupported-media-type";
+    let slug = "unsupported-media-type";
     upload(b"#!/bin/sh".to_vec())
         .await
-        .problem(415, kind, &["23212f62", ".tar.gz"]);
-    upload(vec![0x1f]).await.problem(415, kind, &["1f"]);
+        .problem(415, slug, &["23212f62", ".tar.gz"]);
+    upload(vec![0x1f]).await.problem(415, slug, &["1f"]);
     upload(vec![])
         .await
         .problem(400, "invalid-request", &["empty"]);
@@ -222,7 +223,7 @@ async fn upload_that_is_no_archive_is_refused() {
         .unwrap();
     Answer::read(form)
         .await
-        .problem(415, kind, &["multipart/form-data", "--data-binary"]);
+        .problem(415, slug, &["multipart/form-data", "--data-binary"]);
     site.request(
         Method::POST,
         "/api/v1/submissions?name=x",
@@ -264,7 +265,7 @@ async fn stalled_upload_times_out() {
 }
 
 #[tokio::test]
-async fn pending_uploads_of_a_team_are_limited() {
+async fn unvalidated_submissions_of_a_team_are_limited() {
     let limits = HttpLimits {
         pending_submissions: 2,
         ..generous_limits()

@@ -1,5 +1,5 @@
 //! Tests of tournaments in the API and on pages. A fake slot runs the games: it takes jobs from the real store and commits
-//! made-up results, as a worker's slot does with real ones.
+//! made-up results, as a worker's slot does with real ones. `cup` and `fake_worker` have helpers, the other modules the tests.
 
 mod archive;
 pub mod cup;

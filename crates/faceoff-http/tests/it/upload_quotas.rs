@@ -16,7 +16,7 @@ fn bundle(bytes: usize) -> Vec<u8> {
     bundle
 }
 
-/// An upload whose beginning is sent, and whose rest is sent only by [`Self::end`].
+/// An upload that waits after its first bytes; [`Self::end`] sends the rest.
 struct OpenUpload {
     sender: mpsc::Sender<()>,
     answer: JoinHandle<Answer>,

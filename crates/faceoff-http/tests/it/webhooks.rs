@@ -106,18 +106,18 @@ async fn webhook_gets_the_events_visible_to_its_owner() {
     assert_eq!(event_ids.len(), received, "each event once");
     let organiser_types = organiser_receiver.types();
     for (kind, times) in [("submission_uploaded", 2), ("evaluation_queued", 2)] {
-        let found = organiser_types
+        let count = organiser_types
             .iter()
             .filter(|found| *found == kind)
             .count();
-        assert_eq!(found, times, "{organiser_types:?}");
+        assert_eq!(count, times, "{organiser_types:?}");
     }
     assert!(
         !organiser_types.contains(&"day_started".to_owned()),
         "the topic was not requested"
     );
 
-    // Everything was delivered, and nothing is sent twice.
+    // Everything was delivered, so another run of the deliverer sends nothing.
     deliver(&site).await;
     assert_eq!(team_receiver.requests().len(), received);
     let listed = deliveries(&site, &path).await;
@@ -155,7 +155,7 @@ async fn failed_delivery_is_retried_and_finally_given_up() {
         delivery["last"]["error"],
         "it answered 500, expected 200 to 299"
     );
-    // The first pause has 5 seconds and a random part.
+    // The pause after the first failure has 5 seconds and a random part.
     let next_at: jiff::Timestamp = string(&delivery["next_at"]).parse().unwrap();
     assert!((5..=6).contains(&next_at.duration_since(site.now()).as_secs()));
 

@@ -1,5 +1,6 @@
 //! Test of a whole season: three months with twenty teams. The clock is set from one evaluation day to the next. Requests,
-//! database, schedule and clean-up are real; a fake worker commits random outcomes without running agents.
+//! database, schedule and clean-up are real; a fake worker commits random outcomes without running agents. `season` runs the
+//! days, `organiser_actions` has what organisers and teams do on some of them.
 
 mod fake_worker;
 mod organiser_actions;

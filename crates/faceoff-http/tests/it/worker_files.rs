@@ -210,7 +210,7 @@ async fn late_upload_does_not_replace_a_checked_file() {
     answer.problem(403, "forbidden", &["its files cannot be changed"]);
     assert_eq!(stored_bytes("game.zip").await, None);
 
-    // The same is so after the check has ended, when the lease is over.
+    // After the check, when the lease is over, the file cannot be replaced either.
     site.live.workers.forget_files(claim.nonce);
     let (rest, answer) = start_upload("game.zip").await;
     site.store.release(&claim, site.now()).await.unwrap();
@@ -242,7 +242,7 @@ async fn banned_worker_loses_access() {
         "forbidden",
         &["no longer holds the lease"],
     );
-    // A job that the worker starts at the moment of the ban.
+    // A job that the worker starts at the moment of the ban, so that its lease is newer than the ban.
     let ClaimedJob { claim, .. } = site.claim().await;
     start_job(&site, &claim).await;
     let grant = Grant {

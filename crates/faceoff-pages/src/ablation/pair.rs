@@ -67,10 +67,10 @@ pub(crate) async fn page(
         ));
     }
     let differing = clips.differing_episodes(&app).await?;
-    let differing = differing.get(&profile).into_iter().flatten();
-    let differing = differing.filter(|DifferingEpisode { ideal, .. }| ideal.task == task);
-    let differing = differing.map(|DifferingEpisode { ideal, .. }| ideal.episode);
-    let [previous_difference, next_difference] = neighbours(differing, episode);
+    let of_profile = differing.get(&profile).into_iter().flatten();
+    let of_task = of_profile.filter(|DifferingEpisode { ideal, .. }| ideal.task == task);
+    let numbers = of_task.map(|DifferingEpisode { ideal, .. }| ideal.episode);
+    let [previous_difference, next_difference] = neighbours(numbers, episode);
     let submission = submission::find(&app, id).await?;
     let team = team::find(&app, submission.team).await?;
     render(&Page {

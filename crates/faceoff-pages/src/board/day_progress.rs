@@ -10,7 +10,7 @@ use faceoff_service::{
 use faceoff_types::{DivisionName, EvaluationId, StageDay};
 use jiff::Timestamp;
 
-/// Evaluations of today, and running ones of the day before.
+/// Evaluations of today, and those of the day before that still run.
 pub(super) struct DayProgress {
     /// Sum over all evaluations, finished ones included.
     pub(super) episodes: Progress,
@@ -76,12 +76,12 @@ impl DayProgress {
         let (state, list) = match evaluation.status {
             _ if is_voided => ("Voided by the organisers", &mut self.ended_without_result),
             EvaluationStatus::Finished { .. } => {
-                self.count(evaluation.progress);
+                self.add_episodes(evaluation.progress);
                 return;
             }
             // A blind stage hides the outcome: the evaluation counts as finished.
             EvaluationStatus::AgentFailed { .. } if evaluation.blind => {
-                self.count(Progress {
+                self.add_episodes(Progress {
                     episodes_done: evaluation.progress.episodes_total,
                     ..evaluation.progress
                 });
@@ -114,16 +114,17 @@ impl DayProgress {
             progress: evaluation.progress,
         });
         if !is_voided && !evaluation.status.is_final() {
-            self.count(evaluation.progress);
+            self.add_episodes(evaluation.progress);
         }
     }
 
-    fn count(&mut self, progress: Progress) {
+    fn add_episodes(&mut self, progress: Progress) {
         self.episodes.episodes_done += progress.episodes_done;
         self.episodes.episodes_total += progress.episodes_total;
     }
 
-    pub(super) fn is_running(&self) -> bool {
+    /// Is any evaluation running or queued?
+    pub(super) fn is_open(&self) -> bool {
         !(self.running.is_empty() && self.queued.is_empty())
     }
 

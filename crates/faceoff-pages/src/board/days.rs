@@ -7,7 +7,7 @@ use jiff::civil::Date;
 
 /// The evaluation days of a board.
 pub(super) struct Days {
-    /// The board counts the results up to this day; `None` before the first day.
+    /// The day of the shown board, which counts the results up to this day; `None` before the first day.
     pub(super) shown: Option<Date>,
     /// Is the shown day not the latest?
     pub(super) shows_past_day: bool,

@@ -32,7 +32,7 @@ struct Page {
     /// Is the board hidden from visitors?
     is_hidden: bool,
     groups: Vec<Group<OverallRow>>,
-    /// Teams that are not shown.
+    /// Number of teams that are not shown.
     omitted: usize,
 }
 
@@ -42,13 +42,14 @@ pub(crate) async fn page(State(app): State<App>) -> Result<Response, PageProblem
     let visibility = Visibility::load(&app, Viewer::Visitor).await?;
     let board = board::query(&app, &visibility, BoardQuery::default(), None).await?;
     let score_history = ScoreHistory::default();
-    let context = Context::new(&board, None, &score_history, true);
+    let is_by_rank = true;
+    let context = Context::new(&board, None, &score_history, is_by_rank);
     let mut groups =
         context.groups(|row| OverallRow::new(row, &context, &board.weights, &competition));
-    let mut left = MAX_TEAMS;
+    let mut remaining = MAX_TEAMS;
     for group in &mut groups {
-        group.rows.truncate(left);
-        left -= group.rows.len();
+        group.rows.truncate(remaining);
+        remaining -= group.rows.len();
     }
     groups.retain(|group| !group.rows.is_empty());
     let mut response = render(&Page {

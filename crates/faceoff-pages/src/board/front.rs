@@ -14,7 +14,7 @@ pub(super) struct FrontPage {
     pub(super) title: String,
     pub(super) summary: String,
     pub(super) leader: Option<Leader>,
-    /// Where to take part: the registration, if it is open.
+    /// Path of the page that says how to take part: the registration, if it is open, else the first steps.
     pub(super) take_part: &'static str,
     pub(super) news: Option<News>,
     pub(super) highlight: Option<HighlightLoop>,
@@ -92,9 +92,9 @@ impl Leader {
     fn find(board: &BoardView, groups: &[Group<OverallRow>]) -> Option<Self> {
         let first = board.rows.first()?;
         let row = groups.iter().flat_map(|group| &group.rows).next()?;
-        let mut tied = board.rows.iter().skip(1);
-        let tied: Vec<_> = tied
-            .by_ref()
+        // Rows of the same rank group are statistically tied.
+        let others = board.rows.iter().skip(1);
+        let tied: Vec<_> = others
             .filter(|other| other.rank_group == first.rank_group)
             .collect();
         let whole = |percent: &str| percent.parse().map_or_else(|_| percent.to_owned(), round);

@@ -45,7 +45,7 @@ pub(super) struct BoardInfo {
     pub(super) rows_caption: String,
     /// The shares of the tasks in the score, as a sum.
     pub(super) weighted_sum: String,
-    /// Their number, in words.
+    /// The number of tasks, in words.
     pub(super) task_count: String,
     /// Penalty points by kind of violation.
     pub(super) points_by_violation: String,
@@ -57,8 +57,9 @@ pub(super) struct BoardInfo {
     pub(super) final_day_notice: Option<&'static str>,
     /// Who sees a *blind* board, whose results are hidden until the organisers reveal them.
     pub(super) blind_notice: Option<&'static str>,
-    /// Is it hidden from the viewer?
+    /// Is the board hidden from the viewer?
     pub(super) is_hidden: bool,
+    /// Whether the result of the stage is provisional or signed off, as a sentence.
     pub(super) result_status: String,
     pub(super) is_provisional: bool,
     /// The tasks with columns of their own; empty on the board of a task.
@@ -67,12 +68,13 @@ pub(super) struct BoardInfo {
     pub(super) tabs: Vec<Tab>,
 }
 
+/// A link to the board of another revision of the rules.
 pub(super) struct OtherBoard {
     pub(super) label: String,
     pub(super) query: String,
 }
 
-/// A board of the same stage and day.
+/// A link to the board of a stage, or to the board of a task in the same stage and on the same day.
 pub(super) struct Tab {
     pub(super) name: String,
     pub(super) address: String,
@@ -102,9 +104,10 @@ impl BoardInfo {
         };
         for stage in stages {
             if stage.id == board.stage {
-                let others = stage.revisions.iter();
-                let others = others.filter(|rules| rules.revision != board.revision);
-                other_boards.extend(others.map(|rules| OtherBoard {
+                let other_revisions = stage.revisions.iter();
+                let other_revisions =
+                    other_revisions.filter(|rules| rules.revision != board.revision);
+                other_boards.extend(other_revisions.map(|rules| OtherBoard {
                     label: format!("rules of {}", utc_minute(rules.since)),
                     query: format!("?stage={}&revision={}", stage.id, rules.revision),
                 }));
@@ -185,7 +188,7 @@ fn tabs(competition: &Competition, shown: Option<Task>, address: &Address<'_>) -
         address: address.with_path(path),
         is_shown: task == shown,
     };
-    let of_tasks = competition.tasks.iter().map(|info| {
+    let task_tabs = competition.tasks.iter().map(|info| {
         tab(
             Some(info.task),
             &info.title,
@@ -193,11 +196,11 @@ fn tabs(competition: &Competition, shown: Option<Task>, address: &Address<'_>) -
         )
     });
     iter::once(tab(None, "Overall", "/"))
-        .chain(of_tasks)
+        .chain(task_tabs)
         .collect()
 }
 
-/// As `0.4 × task + 0.6 × other`.
+/// Such as `0.4 × hit + 0.6 × defend`.
 fn weighted_sum(competition: &Competition, weights: &TaskWeights) -> String {
     let terms = competition
         .task_names()
@@ -205,7 +208,7 @@ fn weighted_sum(competition: &Competition, weights: &TaskWeights) -> String {
     terms.collect::<Vec<_>>().join(" + ")
 }
 
-/// As `out of bounds 3, late answers 0.5 to 2`.
+/// Such as `out of bounds 3, late answers 0.5 to 2`.
 fn points_by_violation(competition: &Competition) -> String {
     let kinds = competition
         .violations

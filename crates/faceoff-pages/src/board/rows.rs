@@ -19,7 +19,7 @@ const MIN_SHOWN_TIER_CHANGE: f64 = 0.01;
 
 /// The team of a row with its rank.
 pub(super) struct TeamCell {
-    /// The rank; that of the first one with `=` for teams that are statistically tied.
+    /// The rank. Statistically tied teams share the rank of the first one, with `=`.
     pub(super) rank: String,
     /// Change since the day before, if the board has one.
     pub(super) change: Option<RankChange>,
@@ -79,7 +79,7 @@ fn episodes_per_day(row: &BoardRow) -> u32 {
     per_day(row, episodes.max().unwrap_or(0))
 }
 
-/// Splits episodes over the days of the row.
+/// Episodes per day. A row may be the mean of several days, each with an evaluation.
 fn per_day(row: &BoardRow, episodes: u32) -> u32 {
     let days = u32::try_from(row.evaluations.len()).unwrap_or(u32::MAX);
     episodes / days.max(1)
@@ -106,7 +106,7 @@ pub(super) struct Context<'a> {
 }
 
 impl<'a> Context<'a> {
-    /// `is_by_rank`: rows are grouped by tier.
+    /// `is_by_rank`: the board is sorted by rank. Only then are its rows grouped by tier.
     pub(super) fn new(
         board: &'a BoardView,
         earlier: Option<&'a EarlierBoard>,
@@ -132,6 +132,7 @@ impl<'a> Context<'a> {
         }
     }
 
+    /// The name of the first team of the row's rank group; `None` for that team itself.
     fn tied_with(&self, row: &BoardRow) -> Option<String> {
         let leader = self.leaders.get(&row.rank_group)?;
         let rows = self.board.rows.iter();
@@ -140,6 +141,7 @@ impl<'a> Context<'a> {
         Some(leader.team.to_string())
     }
 
+    /// The change since the board of the day before; `None` without such a board.
     fn change(&self, row: &BoardRow) -> Option<RankChange> {
         let earlier = self.earlier?;
         let Some(previous) = earlier.rank_of(row.team_id) else {

@@ -31,7 +31,7 @@ pub(super) struct Sparkline {
 }
 
 impl ScoreHistory {
-    /// `day`: the board's own; `None` before the first result.
+    /// `day`: the board's own; `None` before the first result. `is_live`: includes results after a freeze of the board.
     pub(super) async fn load(
         app: &AppState,
         visibility: &Visibility,
@@ -80,10 +80,11 @@ impl ScoreHistory {
         let (first, last) = self.span()?;
         let scores = self.teams.get(&team).filter(|scores| scores.len() > 1)?;
         // All lines share both axes, so that rows can be compared.
-        let all = self.teams.values().flatten().map(|(_, score)| *score);
-        let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), score| {
-            (low.min(score), high.max(score))
-        });
+        let all_scores = self.teams.values().flatten().map(|(_, score)| *score);
+        let (low, high) = all_scores
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), score| {
+                (low.min(score), high.max(score))
+            });
         let range = (high - low).max(1.0);
         let position = |(day, score): &(Date, f64)| {
             let x = MARGIN + (WIDTH - 2.0 * MARGIN) * days(first, *day) / days(first, last);

@@ -112,7 +112,7 @@ impl Sort {
         })
     }
 
-    /// The default: by rank, grouped by tier if there are tiers.
+    /// Is it the default sort: by rank, the first rank on top? Only then are rows grouped by tier.
     pub(super) fn is_by_rank(&self) -> bool {
         self.key.column == BoardColumn::Rank && !self.key.is_reversed
     }

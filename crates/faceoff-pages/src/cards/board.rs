@@ -23,7 +23,7 @@ const MAX_TEAMS: usize = 5;
 const FIRST_ROW: f64 = 254.0;
 const ROW_HEIGHT: f64 = 80.0;
 /// Left end of the names.
-const NAMES: f64 = 150.0;
+const NAMES_LEFT: f64 = 150.0;
 const NAME_WIDTH: f64 = 380.0;
 
 type BoardQueryParams = Result<QueryParams<BoardPageQuery>, Problem>;
@@ -86,16 +86,16 @@ fn draw_rows(card: &mut Card, board: &BoardView) {
         };
         card.text(&shared_rank(&board.rows, row), &rank, [LEFT, y], 80.0);
         let team = name.truncated(legible(row.team.as_str()), NAME_WIDTH);
-        card.text(&team, &name, [NAMES, y], NAME_WIDTH);
+        card.text(&team, &name, [NAMES_LEFT, y], NAME_WIDTH);
         // Tiers precede scores in the ranking.
         if let Some(tier) = row.tier {
-            let x = NAMES + name.width_px(&team) + 24.0;
+            let x = NAMES_LEFT + name.width_px(&team) + 24.0;
             card.text(tier.title(), &tier_style(tier, 28.0), [x, y], 260.0);
         }
         let percent = format!("{} %", value.percent());
         card.text_at_end(&percent, &name, [RIGHT - 240.0, y], 220.0);
         card.text_at_end(&value.interval(), &interval, [RIGHT, y], 220.0);
-        card.bar(&value, [NAMES, y + 26.0], (RIGHT - NAMES, 12.0));
+        card.bar(&value, [NAMES_LEFT, y + 26.0], (RIGHT - NAMES_LEFT, 12.0));
         y += ROW_HEIGHT;
     }
 }

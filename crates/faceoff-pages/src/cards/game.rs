@@ -41,7 +41,7 @@ const DRAWING: Place = Place {
 /// Baseline of names and score.
 const SCORE_LINE: f64 = 196.0;
 
-/// A visitor who hides results gets a picture without them.
+/// The picture of a game. A visitor who hides results gets it without them.
 pub(super) async fn picture(
     State(app): State<App>,
     preconditions: RequestPreconditions,
@@ -89,7 +89,7 @@ fn draw_score(card: &mut Card, view: &GameView, score: Option<[u32; 2]>) {
         ),
     };
     let middle = f64::midpoint(LEFT, RIGHT);
-    let half = style.width_px(&text) / 2.0 + 40.0;
+    let half_gap = style.width_px(&text) / 2.0 + 40.0;
     card.aligned_text(
         &text,
         &style,
@@ -98,11 +98,21 @@ fn draw_score(card: &mut Card, view: &GameView, score: Option<[u32; 2]>) {
         Align::Middle,
     );
     let [home, away] = view.sides.each_ref().map(|side| side.team_name.as_str());
-    let width = middle - half - LEFT;
-    let name = |colour| text_style(Weight::Semibold, 54.0, colour);
-    card.text_at_end(home, &name("accent"), [middle - half, SCORE_LINE], width);
+    let width = middle - half_gap - LEFT;
+    let name_style = |colour| text_style(Weight::Semibold, 54.0, colour);
+    card.text_at_end(
+        home,
+        &name_style("accent"),
+        [middle - half_gap, SCORE_LINE],
+        width,
+    );
     // The away side's colour is that of the tier “improvable”, without its meaning.
-    card.text(away, &name("fair"), [middle + half, SCORE_LINE], width);
+    card.text(
+        away,
+        &name_style("fair"),
+        [middle + half_gap, SCORE_LINE],
+        width,
+    );
 }
 
 /// The paths that the card shows: the last seconds before the first goal, or before the end of a game without goals.
@@ -116,6 +126,7 @@ impl Scene {
     async fn find(app: &App, id: GameId, result: &GameResultView) -> Result<Option<Self>, Problem> {
         let clips = match GameClips::find(app, Viewer::Visitor, id).await {
             Ok(clips) => clips,
+            // There is no replay of this game, or none any more.
             Err(problem) if problem.kind() == ProblemKind::Conflict => return Ok(None),
             Err(problem) => return Err(problem),
         };
@@ -141,13 +152,13 @@ impl Scene {
             .map_or(0, |end| index(end) + 1);
         let end = index(last) + 1;
         let start = rally_start.max(end.saturating_sub(GOAL_PATH_STEPS + 1));
-        let part = |positions: Vec<[f64; 2]>| {
+        let scene_part = |positions: Vec<[f64; 2]>| {
             let to = end.min(positions.len());
             positions[start.min(to)..to].to_vec()
         };
         Self {
-            puck: part(clip.puck_positions()),
-            mallets: [0, 1].map(|side| part(clip.mallet_positions(side))),
+            puck: scene_part(clip.puck_positions()),
+            mallets: [0, 1].map(|side| scene_part(clip.mallet_positions(side))),
         }
     }
 
@@ -174,7 +185,7 @@ impl Scene {
     }
 }
 
-/// The sample of the first goal, or the last one.
+/// The number of the first goal's sample; without goals, of the last sample. A sample is recorded per control step.
 fn last_sample(analysis: &GameAnalysis, steps: u32) -> u32 {
     analysis.goals.first().map_or(steps, |goal| goal.sample)
 }

@@ -42,14 +42,15 @@ pub(super) fn text_style(weight: Weight, size_px: f64, colour_name: &str) -> Tex
 }
 
 impl Card {
-    /// A card with the name of the site on the left of its head, and `context` on the right.
+    /// A card with the name of the site on the left of its head, and `context`, such as the competition, on the right.
     pub(super) fn new(context: &str) -> Self {
         let mut card = Self {
             drawing: Drawing::new(WIDTH_PX, HEIGHT_PX, colour("ground")),
         };
         let icon = assets::ICON.text();
-        let place = format!("<svg x=\"{LEFT}\" y=\"34\" width=\"48\" height=\"48\" ");
-        card.drawing.elements(&icon.replacen("<svg ", &place, 1));
+        let placed_svg = format!("<svg x=\"{LEFT}\" y=\"34\" width=\"48\" height=\"48\" ");
+        card.drawing
+            .elements(&icon.replacen("<svg ", &placed_svg, 1));
         let brand = text_style(Weight::Semibold, 36.0, "ink");
         card.text("Faceoff", &brand, [LEFT + 66.0, 71.0], 300.0);
         let soft = text_style(Weight::Regular, 32.0, "soft");
@@ -150,7 +151,7 @@ impl Card {
 
     /// A bar per task with its title and success rate, in the order of the competition.
     pub(super) fn tasks(&mut self, competition: &Competition, results: &TaskMap<TaskView>) {
-        const FROM: f64 = 640.0;
+        const BARS_LEFT: f64 = 640.0;
         let label = text_style(Weight::Regular, 36.0, "ink");
         let figure = text_style(Weight::Semibold, 38.0, "ink");
         let tasks = competition.tasks.iter();
@@ -158,10 +159,10 @@ impl Card {
         let mut y = 336.0;
         for (title, result) in tasks.take(MAX_TASKS) {
             let rate = PercentWithInterval::of_task(result);
-            self.text(title, &label, [FROM, y], 330.0);
+            self.text(title, &label, [BARS_LEFT, y], 330.0);
             let percent = format!("{} %", rate.percent());
             self.text_at_end(&percent, &figure, [RIGHT, y], 200.0);
-            self.bar(&rate, [FROM, y + 28.0], (RIGHT - FROM, 18.0));
+            self.bar(&rate, [BARS_LEFT, y + 28.0], (RIGHT - BARS_LEFT, 18.0));
             y += 100.0;
         }
     }
@@ -176,22 +177,22 @@ impl Card {
     ) {
         let at = |percent: f64| x + width * percent.clamp(0.0, 100.0) / 100.0;
         let [low, high] = value.interval.map(at);
-        let mut vertical = |x: f64, width: f64, height: f64, name: &str| {
+        let mut rectangle_around = |x: f64, width: f64, height: f64, colour_name: &str| {
             let corner = [x - width / 2.0, y - height / 2.0];
             self.drawing
-                .rectangle(corner, [width, height], colour(name));
+                .rectangle(corner, [width, height], colour(colour_name));
         };
-        vertical(x + width / 2.0, width, 3.0, "track");
+        rectangle_around(x + width / 2.0, width, 3.0, "track");
         for mark in [0.0, 50.0, 100.0] {
-            vertical(at(mark), 3.0, thickness, "track");
+            rectangle_around(at(mark), 3.0, thickness, "track");
         }
-        vertical(
+        rectangle_around(
             f64::midpoint(low, high),
             (high - low).max(2.0),
             thickness,
             "range",
         );
-        vertical(at(value.percent), 6.0, thickness + 8.0, "ink");
+        rectangle_around(at(value.percent), 6.0, thickness + 8.0, "ink");
     }
 }
 

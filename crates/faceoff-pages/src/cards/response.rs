@@ -15,7 +15,7 @@ use faceoff_service::{
 };
 use std::sync::Arc;
 
-/// Programs that show cards fetch a picture once and store it; a short time is enough for many readers of one message.
+/// Programs that show link previews fetch a picture once and store it; a short time is enough for many readers of one message.
 const CACHE_CONTROL: &str = "public, max-age=60";
 
 /// The picture of a card; `load` reads what it shows. The reads see one state of the season, but while the picture is drawn they
@@ -36,7 +36,7 @@ pub(super) async fn respond(
             HeaderValue::from_static(CACHE_CONTROL),
         ),
     ];
-    // Chats load it from their own pages.
+    // Chats load the picture from their own pages.
     let headers = (Extension(Embeddable), headers);
     if let Some(not_modified) = preconditions.not_modified(&tag) {
         return Ok((headers, not_modified).into_response());
@@ -47,7 +47,8 @@ pub(super) async fn respond(
     Ok((headers, media_type, Vec::clone(&png)).into_response())
 }
 
-/// Draws a picture on a blocking thread. The thread holds both permits to the end, also if the client has closed the connection.
+/// Draws a picture on a blocking thread; one picture is drawn at a time, and few requests may wait for it. The thread holds both
+/// permits to the end, also if the client has closed the connection.
 async fn draw(app: &App, drawing: Drawing) -> Result<Arc<Vec<u8>>, Problem> {
     let request_permit = Arc::clone(&app.card_request_permits).try_acquire_owned();
     let request_permit = request_permit.map_err(|_| {
@@ -57,7 +58,7 @@ async fn draw(app: &App, drawing: Drawing) -> Result<Arc<Vec<u8>>, Problem> {
     let drawing_permit = Arc::clone(&app.card_drawing_permit).acquire_owned().await;
     let drawing_permit = drawing_permit.map_err(Problem::internal)?;
     let draw = move || -> Result<Vec<u8>, PictureError> {
-        let _held = (request_permit, drawing_permit);
+        let _permits = (request_permit, drawing_permit);
         Picture::draw(&drawing)?.png()
     };
     let png = tokio::task::spawn_blocking(draw)

@@ -1,4 +1,4 @@
-//! Drawings of the table on cards: those of the pages, with their colours.
+//! Drawings of the table on cards: the still pictures of the pages, in the same colours.
 
 use super::style;
 use crate::{
@@ -27,7 +27,7 @@ struct StillDrawing<'a> {
     table: &'a TableOutline,
 }
 
-/// The SVG element of a still picture; `opponent` is the last position of the other side in a game.
+/// The SVG element of a still picture; `opponent` is the last position of the away side in a game.
 pub(super) fn svg(still: &Still, opponent: Option<Dot>, place: Place) -> String {
     render(&StillDrawing {
         height: height(&still.table, &place),
@@ -56,9 +56,10 @@ pub(super) fn empty_table(place: Place) -> String {
 
 /// The height of a drawing of this table.
 fn height(table: &TableOutline, place: &Place) -> f64 {
-    let mut sides = table.view_box.split(' ').skip(2);
-    let mut side = || sides.next().and_then(|side| side.parse().ok());
-    let (width, height): (Option<f64>, Option<f64>) = (side(), side());
+    // `view_box` is “left top width height”.
+    let mut sizes = table.view_box.split(' ').skip(2);
+    let mut next_size = || sizes.next().and_then(|size| size.parse().ok());
+    let (width, height): (Option<f64>, Option<f64>) = (next_size(), next_size());
     place.width
         * height
             .zip(width)

@@ -3,13 +3,13 @@
 use crate::assets;
 use std::{collections::BTreeMap, sync::OnceLock};
 
-/// Selectors with which the lines of `episodes.css` begin that style drawings of the table.
+/// Selectors of drawings of the table. Each of their rules is one line of `episodes.css` that begins with the selector.
 const DRAWING_SELECTORS: [&str; 5] = [".table-map", ".mark", ".trajectory", ".start", ".disc"];
 
-/// Lines of drawings are visible at the size at which chats show cards.
+/// Rules that make lines wide enough for the size at which chats show cards.
 const WIDE_LINES: &str = ".trajectory{stroke-width:10}.mark.contact,.start,.disc{stroke-width:7}";
 
-/// The light colour of a custom property of the pages, such as `ink`.
+/// The light colour of a custom property of the pages: `ground` (background), `ink` (text), `soft` (less important text), and so on.
 pub(super) fn colour(name: &str) -> &'static str {
     let found = colours().get(name);
     found

@@ -1,9 +1,9 @@
-//! Columns with positions in the table of episodes. Of other worlds than air hockey no positions are known.
+//! Columns with positions on the table in the download of episodes. They exist only in the world of air hockey.
 
 use faceoff_replay::{EpisodeIndexEntry, ViolationSummary};
 use faceoff_service::csv::or_empty;
 
-/// Ends of the names of the columns of a kind of violation.
+/// Ends of the names of the columns that each kind of violation has.
 pub(super) const VIOLATION_SUFFIXES: [&str; 3] = ["x_m", "y_m", "joint"];
 
 /// Columns of the puck's state at the start and at the end.

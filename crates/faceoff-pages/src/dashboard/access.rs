@@ -46,7 +46,8 @@ pub(crate) fn router(dashboard_path: &str) -> Router<App> {
         .route(&path("/people/{id}/remove"), post(remove_user))
 }
 
-/// Number of invitations, and of tokens of which the ended ones are listed: the newest ones.
+/// How many of the newest invitations are listed, and how many of the newest tokens are searched for expired and revoked ones. All valid
+/// tokens are listed.
 const MAX_LISTED: u32 = 500;
 
 #[derive(Template)]
@@ -59,7 +60,7 @@ struct Page {
     is_organiser: bool,
     /// Title and value of a secret, shown only once.
     secret: Option<(String, String)>,
-    /// What has ended by the change before, and what stays.
+    /// After a token was revoked or a user removed: which other tokens and sessions ended with it, and which stay.
     ended: Vec<String>,
     users: Vec<UserRow>,
     tokens: Vec<TokenRow>,
@@ -118,6 +119,7 @@ fn access_path(caller: &Caller) -> &'static str {
 #[derive(Default)]
 struct PageState {
     secret: Option<(String, String)>,
+    /// See [`Page::ended`].
     ended: Vec<String>,
     token_name: String,
     note: String,
@@ -186,15 +188,15 @@ async fn page_with(
     let now = app.config.clock.now();
     let names = event::actor_names(app).await?;
     let path = access_path(caller);
-    let row = |token| token_row(token, &names, caller, now);
-    // All valid ones, so that none can be hidden behind many that have ended.
+    let build_row = |token| token_row(token, &names, caller, now);
+    // All valid ones, so that none can be hidden behind many expired ones.
     let tokens = tokens::valid_tokens(app, caller).await?;
-    let tokens: Vec<TokenRow> = tokens.into_iter().map(token::view).map(row).collect();
+    let tokens: Vec<TokenRow> = tokens.into_iter().map(token::view).map(build_row).collect();
     let newest = tokens::tokens_after(app, caller, None, MAX_LISTED).await?;
     let newest = newest.unwrap_or_default();
     let is_shortened = newest.len() >= MAX_LISTED as usize;
     let inactive_tokens = newest.into_iter().filter(|token| !token.is_valid(now));
-    let inactive_tokens = inactive_tokens.map(token::view).map(row).collect();
+    let inactive_tokens = inactive_tokens.map(token::view).map(build_row).collect();
     let listed = invitations::invitations_after(app, caller, None, MAX_LISTED).await?;
     let listed = listed
         .into_iter()
@@ -203,11 +205,11 @@ async fn page_with(
     let (invitations, closed_invitations): (Vec<_>, Vec<_>) =
         listed.partition(|invitation| invitation.state == "open");
     let is_organiser = caller.is_organiser();
-    let own = caller.user().map(|person| person.id);
+    let own_id = caller.user().map(|person| person.id);
     let users = users::list_users(app, caller).await?;
     let users = users.into_iter().map(|person| {
         let view = user::view(person);
-        let is_self = own == Some(view.id);
+        let is_self = own_id == Some(view.id);
         UserRow {
             id: view.id,
             name: view.name.to_string(),

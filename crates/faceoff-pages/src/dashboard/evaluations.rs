@@ -47,7 +47,7 @@ pub(super) async fn of_team(
 
 fn evaluation_row(visibility: &Visibility, view: EvaluationView) -> EvaluationRow {
     let scored_at = view.status.finished_at();
-    let is_frozen = scored_at
+    let is_hidden_by_freeze = scored_at
         .is_some_and(|scored_at| visibility.hiding_freeze(view.stage, scored_at).is_some());
     let mut row = EvaluationRow {
         id: view.id,
@@ -61,15 +61,14 @@ fn evaluation_row(visibility: &Visibility, view: EvaluationView) -> EvaluationRo
         faults: Vec::new(),
         log: None,
     };
-    let finished_blind = "finished; the stage is blind";
     row.state = match view.status {
         EvaluationStatus::Queued => "waiting for a free slot".to_owned(),
         EvaluationStatus::Running => "running".to_owned(),
         EvaluationStatus::Scoring => "computing the score".to_owned(),
         EvaluationStatus::Finished { .. } | EvaluationStatus::AgentFailed { .. } if view.blind => {
-            finished_blind.to_owned()
+            "finished; the stage is blind".to_owned()
         }
-        EvaluationStatus::Finished { .. } if is_frozen => {
+        EvaluationStatus::Finished { .. } if is_hidden_by_freeze => {
             "finished; the boards of the stage are frozen".to_owned()
         }
         EvaluationStatus::Finished {

@@ -1,6 +1,6 @@
 //! The games of a team in tournaments.
 
-use crate::game_row::GameRow;
+use crate::game_row::{GameRow, ResultDisplay};
 use faceoff_service::{
     app::AppState,
     problem::Problem,
@@ -9,7 +9,7 @@ use faceoff_service::{
 };
 use faceoff_types::{StageName, TeamId, TournamentId};
 
-/// Games of a tournament on the page, the latest ones.
+/// How many of the latest games of a tournament are listed.
 const MAX_LISTED: usize = 5;
 
 /// A tournament that the team has entered.
@@ -24,16 +24,16 @@ pub(super) struct TeamTournament {
 pub(super) async fn of_team(
     app: &AppState,
     team: TeamId,
-    hides_results: bool,
+    results: ResultDisplay,
 ) -> Result<Vec<TeamTournament>, Problem> {
     let mut tournaments = Vec::new();
     for (id, name) in entered_tournaments(app, team).await?.into_iter().rev() {
         let state = TournamentState::without_standings(app, id).await?;
         let viewer = Viewer::Team(team);
-        let views = game::round_games(&state, viewer, None)?;
-        let rows = views
+        let round_games = game::round_games(&state, viewer, None)?;
+        let rows = round_games
             .iter()
-            .filter_map(|view| GameRow::new(view, hides_results));
+            .filter_map(|view| GameRow::new(view, results));
         let mut games: Vec<GameRow> = rows.filter(|row| row.team_ids.contains(&team)).collect();
         games.drain(..games.len().saturating_sub(MAX_LISTED));
         tournaments.push(TeamTournament { id, name, games });

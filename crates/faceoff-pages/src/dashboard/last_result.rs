@@ -51,12 +51,12 @@ pub(super) struct FailedEpisode {
 pub(super) async fn of_team(app: &App, team: TeamId) -> Result<Option<LastResult>, Problem> {
     let visibility = Visibility::load(app, Viewer::Team(team)).await?;
     let board = board::query(app, &visibility, BoardQuery::default(), None).await?;
-    let own = board.rows.iter().find(|row| row.team_id == team);
-    let Some(row) = own else {
+    let own_row = board.rows.iter().find(|row| row.team_id == team);
+    let Some(row) = own_row else {
         return Ok(None);
     };
-    let titles = app.config.competition().tasks.iter();
-    let tasks = titles.filter_map(|info| {
+    let tasks = app.config.competition().tasks.iter();
+    let tasks = tasks.filter_map(|info| {
         let result = row.tasks.get(&info.task)?;
         Some((info.title.clone(), Rate::new(result)))
     });
@@ -68,7 +68,7 @@ pub(super) async fn of_team(app: &App, team: TeamId) -> Result<Option<LastResult
         score: Rate::of_score(row.score, &row.tasks, &board.weights),
         tier: row.tier,
         tasks: tasks.collect(),
-        // Without these pictures, whose errors are in the log, the dashboard still has the rest, such as the upload.
+        // An error, which is in the log, omits these episodes only: the rest of the dashboard, such as the upload, must work.
         failed: worst_failed(app, &visibility, row)
             .await
             .unwrap_or_default(),
@@ -110,6 +110,7 @@ async fn worst_failed(
     Ok(failed)
 }
 
+/// What orders failed episodes, the worst one last: the number of violations, then of late answers.
 fn badness(summary: &EpisodeIndexEntry) -> (usize, u32) {
     (summary.violations.len(), summary.late_answers)
 }

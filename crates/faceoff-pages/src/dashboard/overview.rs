@@ -30,7 +30,7 @@ use faceoff_types::EvaluationId;
 use jiff::Timestamp;
 use serde::Deserialize;
 
-/// Number of submissions and evaluations in the lists; older submissions are folded.
+/// Number of submissions and evaluations in the lists. Older submissions are in a part of the page that is closed at first.
 const MAX_LISTED: usize = 10;
 
 #[derive(Template)]
@@ -47,7 +47,7 @@ struct Page {
     last_result: Option<LastResult>,
     tournaments: Vec<TeamTournament>,
     active: Option<SubmissionRow>,
-    /// Today's evaluation, with what happens next.
+    /// Today's evaluation, with a sentence on what happens next.
     today: Option<(EvaluationId, String)>,
     newest: Vec<SubmissionRow>,
     older: Vec<SubmissionRow>,
@@ -73,6 +73,7 @@ pub(super) async fn page(
     page_with(&app, &member, &spoilers, Notice::Done(&notice)).await
 }
 
+/// The dashboard with a notice; also the answer to an upload or a form that was refused.
 pub(super) async fn page_with(
     app: &App,
     member: &PageMember,
@@ -99,7 +100,7 @@ pub(super) async fn page_with(
             .and_then(|next| next.at)
             .map(|at| (at, countdown::until(at, app.config.clock.now()))),
         last_result: last_result::of_team(app, team.id).await?,
-        tournaments: games::of_team(app, team.id, spoilers.hides_results()).await?,
+        tournaments: games::of_team(app, team.id, spoilers.result_display()).await?,
         next_cutoff: me.next_cutoff.as_ref().map(ToString::to_string),
         active: active.map(SubmissionRow::from),
         today,

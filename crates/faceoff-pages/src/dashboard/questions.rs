@@ -54,6 +54,7 @@ pub(super) async fn ask(
 ) -> Result<Response, PageProblem> {
     let PageForm(form) = form?;
     let team = member.team.team.id;
+    // A form that is sent twice asks only once.
     let asked = match announcements::is_open_question(&app, team, &form).await {
         Ok(false) => announcements::ask(&app, &member.team, &form)
             .await

@@ -48,6 +48,7 @@ struct TimingRow {
     mean_ms: String,
     p99_ms: String,
     max_ms: String,
+    /// Penalty points per episode.
     points: String,
     violations: String,
 }
@@ -94,10 +95,10 @@ async fn page_with(
     notice: Notice<'_>,
     form: Option<DescriptionForm>,
 ) -> Result<Response, PageProblem> {
-    let found = app.store.submission(id).await;
+    let stored = app.store.submission(id).await;
     let submission = member
         .caller
-        .visible("submission", found, |submission| submission.team)?;
+        .visible("submission", stored, |submission| submission.team)?;
     let view = submission::build(app, submission).await?;
     let log = match &view.status {
         SubmissionStatus::Valid { log } | SubmissionStatus::Invalid { log, .. } => log.clone(),
@@ -174,6 +175,7 @@ pub(super) async fn describe(
     form: Result<PageForm<DescriptionForm>, Problem>,
 ) -> Result<Response, PageProblem> {
     let (PathParam(id), PageForm(form)) = (id?, form?);
+    // The outer `Some` changes the field, an inner `None` removes its value.
     let change_to = |text: &str| Some(Some(text.trim().to_owned()).filter(|text| !text.is_empty()));
     let change = SubmissionChange {
         label: change_to(&form.label),

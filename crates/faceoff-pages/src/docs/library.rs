@@ -20,7 +20,7 @@ pub(super) struct Group {
 pub(super) struct Page {
     pub(super) name: &'static str,
     pub(super) title: &'static str,
-    /// Content of the page in one line.
+    /// What the page is about, in one line.
     pub(super) summary: &'static str,
     pub(super) html: String,
     pub(super) contents: Vec<ContentsEntry>,

@@ -1,12 +1,12 @@
 //! Code of a listing as HTML: comments, strings, numbers, keywords and keys with a class each, and prompts apart from their
-//! commands. It knows no grammar: what it does not recognise stays plain.
+//! commands. It knows no grammar: what it does not recognise has no class.
 
 use super::escape::escape;
 
 /// The prompt of a command; other lines of a session are output.
 const PROMPT: &str = "$ ";
 
-/// How a language writes what is coloured.
+/// How a language writes the tokens that are coloured.
 struct Language {
     comment: &'static str,
     /// Delimiters of strings, long ones first.
@@ -14,14 +14,15 @@ struct Language {
     /// Delimiter of strings without escapes.
     raw_string: Option<char>,
     keywords: &'static [&'static str],
-    /// After a key.
+    /// The character after a key; `None` if keys are not coloured.
     key_end: Option<char>,
     has_numbers: bool,
     /// A comment begins after a space only, and strings may have several lines.
     is_shell: bool,
 }
 
-const PLAIN: Language = Language {
+/// The base of the languages below, which change some fields.
+const DEFAULTS: Language = Language {
     comment: "#",
     strings: &["\"", "'"],
     raw_string: Some('\''),
@@ -36,24 +37,24 @@ const SHELL: Language = Language {
     ],
     has_numbers: false,
     is_shell: true,
-    ..PLAIN
+    ..DEFAULTS
 };
 const TOML: Language = Language {
     strings: &["\"\"\"", "'''", "\"", "'"],
     keywords: &["true", "false"],
     key_end: Some('='),
-    ..PLAIN
+    ..DEFAULTS
 };
 const JSON: Language = Language {
     comment: "//",
     strings: &["\""],
     keywords: &["true", "false", "null"],
     key_end: Some(':'),
-    ..PLAIN
+    ..DEFAULTS
 };
 const YAML: Language = Language {
     keywords: &["true", "false"],
-    ..PLAIN
+    ..DEFAULTS
 };
 const PYTHON: Language = Language {
     strings: &["\"\"\"", "'''", "\"", "'"],
@@ -63,7 +64,7 @@ const PYTHON: Language = Language {
         "False", "finally", "for", "from", "if", "import", "in", "is", "lambda", "None", "not",
         "or", "pass", "raise", "return", "True", "try", "while", "with", "yield",
     ],
-    ..PLAIN
+    ..DEFAULTS
 };
 const RUST: Language = Language {
     comment: "//",
@@ -75,7 +76,7 @@ const RUST: Language = Language {
         "let", "loop", "match", "mod", "move", "mut", "pub", "ref", "return", "self", "Self",
         "static", "struct", "trait", "true", "type", "use", "where", "while",
     ],
-    ..PLAIN
+    ..DEFAULTS
 };
 
 /// The HTML of a listing. `language`: the word after its fence.
@@ -104,6 +105,7 @@ fn render_session(shell: &Language, code: &str) -> String {
     lines.collect()
 }
 
+/// The HTML of code, with a span of a class around each token that is coloured.
 fn colour(language: &Language, code: &str) -> String {
     let mut out = String::with_capacity(code.len() * 3 / 2);
     // Up to `done` the code is written; up to `position` it is read.
@@ -124,7 +126,7 @@ fn colour(language: &Language, code: &str) -> String {
 }
 
 impl Language {
-    /// By the word after the fence of a Markdown listing.
+    /// The language by the word after the fence of a Markdown listing.
     fn named(name: &str) -> Option<&'static Self> {
         Some(match name {
             "sh" | "console" => &SHELL,
@@ -137,7 +139,7 @@ impl Language {
         })
     }
 
-    /// Length and class of the token at a position before the end of the code.
+    /// Length in bytes and class of the token at `position`, which is before the end of the code.
     fn token(&self, code: &str, position: usize) -> (usize, Option<&'static str>) {
         let (before, rest) = code.split_at(position);
         let follows_space = before.is_empty() || before.ends_with(char::is_whitespace);
@@ -192,7 +194,7 @@ impl Language {
         Some(end + delimiter.len())
     }
 
-    /// Is what stands between the two texts a key, or a part of one such as `a.b`?
+    /// Is the token between the texts `before` and `after` a key, or a part of a key such as `a.b`?
     fn is_key(&self, before: &str, after: &str) -> bool {
         match self.key_end {
             Some(':') => after.trim_start().starts_with(':'),

@@ -26,7 +26,7 @@ pub(super) struct ContentsEntry {
     pub(super) title: String,
 }
 
-/// Resolves links and pictures of a document.
+/// Finds the pages and pictures of this site that a document links to.
 pub(super) trait LinkResolver {
     /// Title and path of the page of a Markdown file.
     fn page(&self, file: &str) -> Option<(&str, String)>;
@@ -74,6 +74,7 @@ pub(super) fn render_document(
 #[derive(Debug, Default)]
 pub(super) struct Prose {
     pub(super) html: String,
+    /// The text without markup.
     pub(super) plain: String,
 }
 
@@ -115,16 +116,21 @@ pub(super) fn slug(heading: &str) -> String {
     anchor.flat_map(char::to_lowercase).collect()
 }
 
+/// Replaces events of the Markdown parser by HTML of this site, and collects the headings and sections on the way.
 struct Writer<'a, S> {
     links: &'a S,
+    /// The events from which the page is rendered.
     out: Vec<Event<'a>>,
+    /// Ids of the headings so far.
     ids: HashSet<String>,
     contents: Vec<ContentsEntry>,
     sections: Sections,
     /// The nearest heading above.
     heading: String,
+    /// Number of tables and listings so far.
     tables: usize,
     listings: usize,
+    /// Of the current table: the alignment of its columns, the current column, and whether the row is the head.
     columns: Vec<Alignment>,
     column: usize,
     is_head: bool,
@@ -199,7 +205,7 @@ impl<'a, S: LinkResolver> Writer<'a, S> {
             self.out.extend(inner);
             return self.html("</h1>\n");
         }
-        let id = self.unique(slug(&title));
+        let id = self.unique_id(slug(&title));
         if level == HeadingLevel::H2 {
             let (id, title) = (id.clone(), title.clone());
             self.contents.push(ContentsEntry { id, title });
@@ -219,7 +225,8 @@ impl<'a, S: LinkResolver> Writer<'a, S> {
         ));
     }
 
-    fn unique(&mut self, slug: String) -> String {
+    /// The slug, with a number if an earlier heading has the same one.
+    fn unique_id(&mut self, slug: String) -> String {
         let numbered = (1..).map(|number| format!("{slug}-{number}"));
         let id = std::iter::once(slug.clone())
             .chain(numbered)
@@ -231,9 +238,9 @@ impl<'a, S: LinkResolver> Writer<'a, S> {
 
     fn picture(&mut self, file: &str, rest: &mut Parser<'a>) {
         let inner = take_until(&Event::End(TagEnd::Image), rest);
-        let shown = plain_text(&inner);
-        self.sections.push_text(&shown);
-        let alt = escape(&shown);
+        let alt = plain_text(&inner);
+        self.sections.push_text(&alt);
+        let alt = escape(&alt);
         match self.links.picture(file) {
             Some(path) => self.html(format!(
                 "<img src=\"{}\" alt=\"{alt}\" loading=\"lazy\">",
@@ -252,11 +259,11 @@ impl<'a, S: LinkResolver> Writer<'a, S> {
             .split_once('#')
             .map_or((to, None), |(file, anchor)| (file, Some(anchor)));
         let inner = take_until(&Event::End(TagEnd::Link), rest);
-        let shown = plain_text(&inner);
-        self.sections.push_text(if shown == file {
+        let link_text = plain_text(&inner);
+        self.sections.push_text(if link_text == file {
             self.links.page(file).map_or(file, |(title, _)| title)
         } else {
-            &shown
+            &link_text
         });
         match self.links.page(file) {
             Some((title, path)) => {
@@ -268,7 +275,7 @@ impl<'a, S: LinkResolver> Writer<'a, S> {
                     escape(&format!("{path}{anchor}"))
                 ));
                 // Links that show a file name show the title of the page instead.
-                if shown == file {
+                if link_text == file {
                     self.html(escape(title));
                 } else {
                     self.out.extend(inner);
@@ -278,7 +285,7 @@ impl<'a, S: LinkResolver> Writer<'a, S> {
             // The site has no page for this file of the repository: show its path.
             None => {
                 let path = file.trim_start_matches("../");
-                if path.contains(&shown) {
+                if path.contains(&link_text) {
                     self.html(format!("<code>{}</code>", escape(path)));
                 } else {
                     self.out.extend(inner);

@@ -16,7 +16,7 @@ pub(super) struct OutlineGroup {
 pub(super) struct OutlineEntry {
     pub(super) title: String,
     pub(super) path: String,
-    /// Content of the page in one line.
+    /// What the page is about, in one line.
     pub(super) summary: String,
 }
 

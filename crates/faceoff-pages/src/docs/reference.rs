@@ -32,8 +32,10 @@ pub(super) struct Group {
     pub(super) operations: Vec<Operation>,
 }
 
+/// An operation of the API: a method of a path.
 #[derive(Debug)]
 pub(super) struct Operation {
+    /// The id in the OpenAPI document, which is the anchor on the page.
     pub(super) id: String,
     /// Method and path.
     pub(super) title: String,

@@ -62,7 +62,7 @@ pub(super) struct Index {
     vocabulary: Vocabulary,
 }
 
-/// How well a section matches. The order of the fields is the order of their importance.
+/// How well a section matches: numbers of matches by place. The most important place is first, since scores are compared field by field.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 struct Score {
     title: u32,
@@ -71,13 +71,13 @@ struct Score {
     synonyms: u32,
 }
 
-/// A section that contains all words so far.
+/// The match of a section with the words of the query that were searched so far.
 #[derive(Debug, Clone, Copy)]
 struct Hit {
     score: Score,
     /// Position of the first match in the text.
     first: Option<usize>,
-    /// Does the section itself have a match, not only the title of its page?
+    /// Does the section itself have a match, not only the title of its page? Later sections of a page are no results for its title.
     is_own: bool,
 }
 
@@ -95,32 +95,35 @@ impl Index {
     /// then by the order of the pages.
     pub(super) fn search(&self, query: &str) -> SearchResults {
         let query = query.to_lowercase();
-        let all: Vec<&str> = words(&query).map(|word| &query[word]).collect();
-        let subject = all.iter().copied().filter(|word| !is_stop_word(word));
-        let mut subject: Vec<&str> = subject.collect();
-        if subject.is_empty() {
-            subject.clone_from(&all);
+        let all_words: Vec<&str> = words(&query).map(|word| &query[word]).collect();
+        let subject_words = all_words.iter().copied().filter(|word| !is_stop_word(word));
+        let mut subject_words: Vec<&str> = subject_words.collect();
+        if subject_words.is_empty() {
+            subject_words.clone_from(&all_words);
         }
-        subject.sort_unstable();
-        subject.dedup();
+        subject_words.sort_unstable();
+        subject_words.dedup();
+        // By section: the match with all words so far; `None` if a word is missing.
         let mut hits: Option<Vec<Option<Hit>>> = None;
         let mut terms = HashSet::new();
         let mut replaced = Vec::new();
-        for word in subject {
+        for word in subject_words {
             let query_terms = self.vocabulary.find(word);
             if query_terms.terms.is_empty() {
                 return SearchResults::default();
             }
-            if let Some(other) = query_terms.correction {
-                replaced.push((word, other));
+            if let Some(correction) = query_terms.correction {
+                replaced.push((word, correction));
             }
-            let found = self.sections_with(&query_terms.terms);
+            let word_hits = self.sections_with(&query_terms.terms);
             terms.extend(query_terms.terms.iter().map(|term| term.stem));
             hits = Some(match hits {
-                None => found,
+                None => word_hits,
                 Some(hits) => {
-                    let both = hits.into_iter().zip(found);
-                    both.map(|(a, b)| Some(a?.and(b?))).collect()
+                    let pairs = hits.into_iter().zip(word_hits);
+                    pairs
+                        .map(|(hit, word_hit)| Some(hit?.and(word_hit?)))
+                        .collect()
                 }
             });
         }
@@ -136,13 +139,13 @@ impl Index {
             count: hits.len(),
             shown: kinds.iter().map(|kind| kind.results.len()).sum(),
             kinds,
-            correction: Correction::new(&all, &replaced),
+            correction: Correction::new(&all_words, &replaced),
         }
     }
 
     /// For each section, how it matches a word of the query, given as the terms that stand for it.
     fn sections_with(&self, terms: &[Term]) -> Vec<Option<Hit>> {
-        let mut found: Vec<Option<Hit>> = vec![None; self.sections.len()];
+        let mut section_hits: Vec<Option<Hit>> = vec![None; self.sections.len()];
         for term in terms {
             for posting in self.vocabulary.postings(term.stem) {
                 let section = &self.sections[posting.section];
@@ -171,11 +174,11 @@ impl Index {
                     first: (posting.in_text > 0).then_some(posting.first),
                     is_own: section.is_start() || posting.in_heading || posting.in_text > 0,
                 };
-                let known = &mut found[posting.section];
+                let known = &mut section_hits[posting.section];
                 *known = Some(known.map_or(hit, |known| known.or(hit)));
             }
         }
-        found
+        section_hits
     }
 
     fn results_of(

@@ -30,7 +30,7 @@ pub(super) struct Section {
     /// Title of the page.
     pub(super) page: String,
     pub(super) heading: String,
-    /// Content of the page in one line; empty for sections other than its first.
+    /// What the page is about, in one line; empty for sections other than its first.
     pub(super) summary: String,
     /// Path of the page with the anchor of the heading.
     pub(super) href: String,
@@ -39,7 +39,7 @@ pub(super) struct Section {
 }
 
 impl Section {
-    /// Is it the first of its page? Its heading is the title.
+    /// Is it the first section of its page? Its heading is the title of the page.
     pub(super) fn is_start(&self) -> bool {
         self.heading == self.page
     }

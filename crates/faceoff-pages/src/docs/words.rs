@@ -50,8 +50,9 @@ pub(super) fn stem(word: &str) -> String {
         return word.to_owned();
     }
     let mut stem = without_ending(without_plural(word));
-    let has = |stem: &str, end: char, least: usize| stem.len() >= least && stem.ends_with(end);
-    if has(&stem, 'e', 4) {
+    let ends_with =
+        |stem: &str, end: char, min_len: usize| stem.len() >= min_len && stem.ends_with(end);
+    if ends_with(&stem, 'e', 4) {
         stem.pop();
     }
     // stopp(ing) and stop
@@ -60,7 +61,7 @@ pub(super) fn stem(word: &str) -> String {
         stem.pop();
     }
     // polici(es) and policy
-    if has(&stem, 'y', 3) && !is_vowel(stem.as_bytes()[stem.len() - 2]) {
+    if ends_with(&stem, 'y', 3) && !is_vowel(stem.as_bytes()[stem.len() - 2]) {
         stem.pop();
         stem.push('i');
     }
@@ -106,11 +107,12 @@ pub(super) fn is_one_typo(a: &str, b: &str) -> bool {
     if a.len().abs_diff(b.len()) > 1 {
         return false;
     }
-    let start = a.iter().zip(b).take_while(|(a, b)| a == b).count();
-    let (a, b) = (&a[start..], &b[start..]);
+    // What differs is left after the common beginning and the common end.
+    let common_start = a.iter().zip(b).take_while(|(a, b)| a == b).count();
+    let (a, b) = (&a[common_start..], &b[common_start..]);
     let pairs = a.iter().rev().zip(b.iter().rev());
-    let end = pairs.take_while(|(a, b)| a == b).count();
-    match (&a[..a.len() - end], &b[..b.len() - end]) {
+    let common_end = pairs.take_while(|(a, b)| a == b).count();
+    match (&a[..a.len() - common_end], &b[..b.len() - common_end]) {
         ([_], []) | ([], [_]) | ([_], [_]) => true,
         ([a1, a2], [b1, b2]) => a1 == b2 && a2 == b1,
         _ => false,

@@ -24,11 +24,11 @@ pub(super) struct EpisodeLink {
 }
 
 impl EpisodeLink {
-    fn new(summary: &EpisodeIndexEntry, position: Position, what: &str) -> Self {
+    fn new(summary: &EpisodeIndexEntry, position: Position, mark: &str) -> Self {
         let EpisodeIndexEntry { task, episode, .. } = summary;
         Self {
             address: format!("episodes/{task}/{episode}"),
-            name: format!("{task} {episode}: {what}"),
+            name: format!("{task} {episode}: {mark}"),
             dot: Dot::at(position),
         }
     }
@@ -50,7 +50,7 @@ pub(super) struct StartMap {
     pub(super) tables: Vec<SuccessTable>,
 }
 
-/// Success rates by a value of the start.
+/// Success rates by ranges of a value at the start of an episode.
 pub(super) struct SuccessTable {
     pub(super) id: String,
     pub(super) caption: &'static str,
@@ -77,7 +77,7 @@ impl StartMap {
         if summaries.is_empty() {
             return None;
         }
-        let starts = |success: bool| -> Vec<Position> {
+        let start_positions = |success: bool| -> Vec<Position> {
             let episodes = summaries
                 .iter()
                 .filter(|summary| summary.success == success);
@@ -86,20 +86,21 @@ impl StartMap {
                 .map(|[x, y, ..]| [x, y])
                 .collect()
         };
-        let (solved, failed) = (starts(true), starts(false));
-        let has_all = solved.len() + failed.len() <= MAX_LINKS;
-        let has_failed = failed.len() <= MAX_LINKS;
+        let (solved, failed) = (start_positions(true), start_positions(false));
+        // Without a link per mark, failed episodes come first.
+        let links_all = solved.len() + failed.len() <= MAX_LINKS;
+        let links_failed = failed.len() <= MAX_LINKS;
         let linked = summaries.iter().filter(|summary| match summary.success {
-            true => has_all,
-            false => has_failed,
+            true => links_all,
+            false => links_failed,
         });
         let links = linked.filter_map(|summary| {
             let [x, y, ..] = summary.puck_at_start?;
-            let what = match summary.success {
+            let outcome = match summary.success {
                 true => "solved",
                 false => "not solved",
             };
-            Some(EpisodeLink::new(summary, [x, y], what))
+            Some(EpisodeLink::new(summary, [x, y], outcome))
         });
         Some(Self {
             task,
@@ -108,7 +109,7 @@ impl StartMap {
             solved_count: solved.len(),
             failed_count: failed.len(),
             links: links.collect(),
-            note: match (has_all, has_failed) {
+            note: match (links_all, links_failed) {
                 (true, _) => ALL_LINKS,
                 (false, true) => "A click on a cross opens the replay.",
                 (false, false) => TOO_MANY_LINKS,
@@ -161,11 +162,11 @@ fn success_by(
     range_indices
         .into_iter()
         .map(|index| {
-            let inside: Vec<_> = summaries
+            let episodes: Vec<_> = summaries
                 .iter()
                 .filter(|summary| range_index(summary).total_cmp(&index).is_eq())
                 .collect();
-            let solved = inside.iter().filter(|summary| summary.success).count();
+            let solved = episodes.iter().filter(|summary| summary.success).count();
             SuccessRow {
                 range: format!(
                     "{} … {} {unit}",
@@ -173,8 +174,8 @@ fn success_by(
                     format::signed((index + 1.0) * width).trim_start_matches('+'),
                 ),
                 solved,
-                total: inside.len(),
-                percent: format::percent(solved, inside.len()),
+                total: episodes.len(),
+                percent: format::percent(solved, episodes.len()),
             }
         })
         .collect()
@@ -187,10 +188,11 @@ pub(super) struct ViolationMap {
     /// Whether marks are links.
     pub(super) note: &'static str,
     pub(super) joints: Vec<Joint>,
+    /// Number of episodes with a violation.
     pub(super) episodes: usize,
 }
 
-/// Episodes whose first violation of a joint limit was at this joint.
+/// Numbers of episodes whose first violation of a joint limit was at this joint.
 pub(super) struct Joint {
     pub(super) joint: u32,
     /// Violations of the position limit.

@@ -17,7 +17,7 @@ pub(super) struct Row {
     pub(super) end_reason: String,
     pub(super) violations: Vec<String>,
     pub(super) duration_s: String,
-    /// Slowest answer; only for viewers of the dataset.
+    /// Slowest answer; only for those who may see the dataset.
     pub(super) slowest_ms: Option<String>,
 }
 

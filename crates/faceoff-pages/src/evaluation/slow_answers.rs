@@ -12,15 +12,15 @@ use faceoff_types::Task;
 use faceoff_types::ViolationName;
 use faceoff_wire::dataset::SlowEpisode;
 
-/// Slow answers, most costly first; once the day is released.
+/// Slow answers, the most costly first; none before the day is released.
 #[derive(Default)]
 pub(super) struct SlowAnswers {
     pub(super) shown: Vec<SlowAnswer>,
     /// Number of affected episodes, including those not shown.
     pub(super) episodes: usize,
-    /// The dataset with the list cannot be read.
+    /// The dataset, which contains the list, cannot be read.
     pub(super) is_unreadable: bool,
-    /// The dataset with the list was removed.
+    /// The dataset, which contains the list, was removed.
     pub(super) is_removed: bool,
 }
 
@@ -84,6 +84,7 @@ impl SlowAnswers {
         })
     }
 
+    /// The episodes with the most points, from the violations that the dataset contains.
     fn worst(violations: ViolationsView) -> Self {
         let mut episodes: Vec<(Task, SlowEpisode)> = violations
             .tasks

@@ -10,12 +10,13 @@ use crate::{
 };
 use faceoff_replay::{Constraint, GameAnalysis, LocatedViolation, Shot, model::CONTROL_STEP_S};
 
-/// Shares of the playing time in percent, per side.
+/// Shares of the playing time in percent. In pairs the home side is first.
 pub(super) struct Possession {
-    /// Puck on the half of the side.
+    /// While the puck was on the half of this side.
     pub(super) halves: [String; 2],
-    /// The side touched the puck last in the rally.
+    /// While this side had touched the puck last.
     pub(super) touched: [String; 2],
+    /// Before a side had touched the puck in the rally.
     pub(super) untouched: String,
 }
 
@@ -27,7 +28,7 @@ pub(super) struct Shots {
     /// m/s; `None` without shots.
     pub(super) mean_speed: Option<String>,
     pub(super) fastest_speed: Option<String>,
-    /// Marks of shots that led to a goal, and of other shots.
+    /// Marks of the shots that led to a goal, and of the other shots; SVG path data.
     pub(super) scored: String,
     pub(super) others: String,
     pub(super) rows: Vec<ShotRow>,
@@ -39,6 +40,7 @@ pub(super) struct ShotRow {
     pub(super) link: String,
     pub(super) position: String,
     pub(super) speed: String,
+    /// Did the shot lead to a goal?
     pub(super) goal: bool,
 }
 
@@ -87,7 +89,7 @@ impl Possession {
 impl Shots {
     pub(super) fn new(analysis: &GameAnalysis, side: usize, team: &str) -> Self {
         let shots = analysis.shots_of(side);
-        let positions = |goal: bool| -> Vec<Position> {
+        let positions_by_success = |goal: bool| -> Vec<Position> {
             let matching = shots.iter().filter(|shot| shot.goal == goal);
             matching.map(|shot| shot.touch_position).collect()
         };
@@ -101,8 +103,8 @@ impl Shots {
             mean_speed: fastest
                 .map(|_| format::one_decimal(speeds().sum::<f64>() / f64::from(count))),
             fastest_speed: fastest.map(format::one_decimal),
-            scored: table_drawing::dots(&positions(true)),
-            others: table_drawing::crosses(&positions(false)),
+            scored: table_drawing::dots(&positions_by_success(true)),
+            others: table_drawing::crosses(&positions_by_success(false)),
             rows: shots.iter().take(MAX_ROWS).map(ShotRow::new).collect(),
         }
     }
@@ -115,16 +117,16 @@ impl Speeds {
             let shots = analysis.shots_of(side).into_iter();
             shots.map(|shot| shot.speed_m_s).collect()
         });
-        let all = || speeds.iter().flatten().copied();
-        all().next()?;
-        let bins = Bins::for_all(SPEED_COLUMN_M_S, all());
+        let all_speeds = || speeds.iter().flatten().copied();
+        all_speeds().next()?;
+        let bins = Bins::for_all(SPEED_COLUMN_M_S, all_speeds());
         let counts = speeds.each_ref().map(|speeds| bins.counts(speeds));
-        let most = counts.iter().flatten().copied().max().unwrap_or_default();
+        let largest_count = counts.iter().flatten().copied().max().unwrap_or_default();
         let in_column = |column: usize| counts.each_ref().map(|counts| counts[column]);
         Some(Self {
             charts: [0, 1].map(|side| {
                 let title = format!("Shots of {}", teams[side]);
-                Histogram::new(&title, "m/s", bins, &counts[side], most)
+                Histogram::new(&title, "m/s", bins, &counts[side], largest_count)
             }),
             rows: (0..bins.count)
                 .map(|column| (bins.label(column), in_column(column)))
@@ -147,13 +149,13 @@ impl ShotRow {
 
 impl Violations {
     pub(super) fn new(analysis: &GameAnalysis, side: usize, team: &str) -> Self {
-        let own: Vec<&LocatedViolation> = analysis
+        let side_violations: Vec<&LocatedViolation> = analysis
             .violations
             .iter()
             .filter(|violation| violation.side == side)
             .collect();
         let constraint_positions = |constraint: Constraint| {
-            let matching = own
+            let matching = side_violations
                 .iter()
                 .filter(|violation| violation.constraint == constraint);
             matching
@@ -162,9 +164,9 @@ impl Violations {
         };
         Self {
             team: team.to_owned(),
-            count: own.len(),
+            count: side_violations.len(),
             marks: ViolationMarks::by_constraint(constraint_positions),
-            rows: own
+            rows: side_violations
                 .iter()
                 .take(MAX_ROWS)
                 .map(|violation| ViolationRow {

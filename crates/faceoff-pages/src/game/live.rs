@@ -26,7 +26,7 @@ const MIN_STEPS_FOR_PACE: u32 = 500;
 /// Positions of puck, home mallet and away mallet that are drawn before the first position is known.
 const START_POSITIONS: [[f64; 2]; 3] = [[0.0, 0.0], [-0.8, 0.0], [0.8, 0.0]];
 
-/// Control steps in two seconds.
+/// Control steps by which links open the replay before an event: two seconds.
 const REPLAY_LEAD_STEPS: u32 = 100;
 
 impl LiveGame {
@@ -39,8 +39,11 @@ impl LiveGame {
         let state = &live.state;
         let total_steps = state.steps;
         let minutes = |steps: u32| format::one_decimal(f64::from(steps) * CONTROL_STEP_S / 60.0);
-        let last = live.events.last().map_or(0, |last| last.step);
-        let step = state.position.map_or(last, |position| position.step);
+        let last_event_step = live.events.last().map_or(0, |last| last.step);
+        // Positions are newer than events, but a game may have none yet.
+        let step = state
+            .position
+            .map_or(last_event_step, |position| position.step);
         let positions = state.position.map_or(START_POSITIONS, |position| {
             let [x, y, _] = position.puck;
             [[x, y], position.mallets[0], position.mallets[1]]

@@ -29,7 +29,7 @@ pub(super) struct GameReplay {
     pub(super) tournament: String,
     /// Address of the clips of the motion, with `{chunk}` for the number of the chunk.
     pub(super) motion_url: String,
-    /// Address of the clips of observations and commands, if the viewer may see those of a side.
+    /// Address of the clips of observations and commands of the side whose clips the viewer may see; `None` if there is none.
     pub(super) observed_url: Option<String>,
     /// Control steps of the game, plus one.
     pub(super) samples: u32,
@@ -117,7 +117,7 @@ impl GameReplay {
 /// The events of a game as the script reads them: each end of a rally as `[sample, kind, side, score, score]`, and each range of
 /// violations as `[first sample, last sample, side, constraints, number]`.
 fn events_json(analysis: &GameAnalysis) -> String {
-    let ends = analysis
+    let rally_ends = analysis
         .rally_ends
         .iter()
         .filter(|end| end.kind != RallyEndKind::GameOver)
@@ -139,7 +139,7 @@ fn events_json(analysis: &GameAnalysis) -> String {
             ])
         });
     json!({
-        "ends": ends.collect::<Vec<_>>(),
+        "ends": rally_ends.collect::<Vec<_>>(),
         "violations": violations.collect::<Vec<_>>(),
     })
     .to_string()
@@ -147,6 +147,7 @@ fn events_json(analysis: &GameAnalysis) -> String {
 
 /// Joins violations of a side that are close to each other, until there are few enough ranges.
 fn violation_ranges(violations: &[LocatedViolation]) -> Vec<ViolationRange> {
+    // Half a second of the game, which is doubled while there are too many ranges.
     let mut gap_steps = 25;
     loop {
         let ranges = joined(violations, gap_steps);
@@ -157,7 +158,7 @@ fn violation_ranges(violations: &[LocatedViolation]) -> Vec<ViolationRange> {
     }
 }
 
-/// `violations` are in the order of their first sample.
+/// Ranges of violations with gaps of at most `gap_steps`. `violations` are in the order of their first sample.
 fn joined(violations: &[LocatedViolation], gap_steps: u32) -> Vec<ViolationRange> {
     let mut ranges: Vec<ViolationRange> = Vec::new();
     for violation in violations {

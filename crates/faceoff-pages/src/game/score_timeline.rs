@@ -9,7 +9,7 @@ use faceoff_replay::{GameAnalysis, RallyEndEvent, RallyEndKind};
 pub(super) struct ScoreTimeline {
     pub(super) chart: ScoreChart,
     pub(super) rows: Vec<Row>,
-    /// Number of rallies without goal or foul.
+    /// Number of rallies that ended without goal or foul.
     pub(super) others: usize,
     /// Paths of the puck into the goals of each side; SVG paths.
     pub(super) goal_paths: [String; 2],
@@ -17,6 +17,7 @@ pub(super) struct ScoreTimeline {
 
 /// The end of a rally.
 pub(super) struct Row {
+    /// Minutes and seconds of the game.
     pub(super) time: String,
     /// The replay two seconds earlier.
     pub(super) link: String,

@@ -8,7 +8,7 @@ pub(super) struct Step {
     pub(super) is_done: bool,
     pub(super) title: &'static str,
     pub(super) detail: &'static str,
-    /// Path and label of the page that does it.
+    /// Path and label of the page on which to do it.
     pub(super) link: Option<(&'static str, &'static str)>,
     /// A command that does it.
     pub(super) command: Option<&'static str>,

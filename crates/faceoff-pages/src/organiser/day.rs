@@ -43,7 +43,7 @@ struct Page {
     next_cutoff: Option<String>,
     /// May an organiser start today's evaluation?
     can_start: bool,
-    /// Is it a past date without a cutoff?
+    /// Is it a past date without a cutoff? An organiser can evaluate it later.
     was_missed: bool,
     is_signed_off: bool,
     paused: Option<DecisionView>,
@@ -61,7 +61,7 @@ struct Page {
 }
 
 impl Page {
-    /// The page of the decision that the day needs most now, with the label of its button.
+    /// Path of the decision that the day needs most now, with the label of its button.
     fn primary_action(&self) -> Option<(String, &'static str)> {
         let StageDay { stage, date } = self.stage_day;
         if self.paused.is_some() {
@@ -83,7 +83,9 @@ struct Row {
     team: TeamId,
     name: TeamName,
     state: &'static str,
+    /// CSS class of the state.
     class: &'static str,
+    /// Why the evaluation is in this state, or why it is an extra one.
     detail: Option<String>,
     /// Episodes done and in total.
     progress: Option<(u32, u32)>,
@@ -94,6 +96,7 @@ struct Row {
     can_rerun: bool,
 }
 
+/// `replaced`: the evaluations of the day that have a rerun.
 fn row(view: EvaluationView, replaced: &BTreeSet<EvaluationId>) -> Row {
     let is_final = view.status.is_final();
     let (state, class, detail, score) = match view.status {
@@ -124,11 +127,11 @@ fn row(view: EvaluationView, replaced: &BTreeSet<EvaluationId>) -> Row {
     );
     let is_counted = has_verdict && view.voided.is_none();
     let expected_end = view.queue.and_then(|queue| queue.expected_at);
-    let voided = view.voided.map(|decision| decision.reason);
-    let extra = view
+    let void_reason = view.voided.map(|decision| decision.reason);
+    let extra_evaluation = view
         .extra_evaluation
         .map(|reason| format!("extra evaluation: {reason}"));
-    let detail = voided.or(detail).or(extra);
+    let detail = void_reason.or(detail).or(extra_evaluation);
     Row {
         id: view.id,
         team: view.team,
@@ -171,8 +174,8 @@ pub(super) async fn page(
     let all_days = store.days().await?;
     let mut days: Vec<_> = all_days.into_iter().map(|(day, _)| day).collect();
     days.retain(|day| day.stage_day.stage == stage.id);
-    let newest = days.iter().map(|day| day.stage_day.date).max();
-    let date = query.day.or(newest).unwrap_or(today.date);
+    let newest_date = days.iter().map(|day| day.stage_day.date).max();
+    let date = query.day.or(newest_date).unwrap_or(today.date);
     let stage_day = StageDay {
         stage: stage.id,
         date,
@@ -189,14 +192,14 @@ pub(super) async fn page(
         .into_iter()
         .map(|evaluation| row(evaluation, &replaced))
         .collect();
-    let reason = match day {
+    let exclusion_reason = match day {
         Some(_) => "no active submission at the cutoff",
         None => "this day has had no cutoff",
     };
     let without_submission = view.without_submission.into_iter();
     let mut excluded: Vec<_> = without_submission
         .filter(|team| team.retired_at.is_none() && team.disqualified.is_none())
-        .map(|team| (team.id, team.name, reason.to_owned()))
+        .map(|team| (team.id, team.name, exclusion_reason.to_owned()))
         .collect();
     let excluded_teams = view.excluded.into_iter();
     excluded.extend(

@@ -18,8 +18,8 @@ use faceoff_api::requests;
 use faceoff_service::{app::AppState, auth::Organiser, problem::Problem};
 use faceoff_types::{DepartureKind, RoundNumber};
 use game::GameDecision;
+use preview::DecisionOutcome;
 pub(super) use preview::DecisionPreview;
-use preview::Done;
 use queue::QueueDecision;
 use stage::StageDecision;
 use std::{fmt, str::FromStr};
@@ -140,7 +140,7 @@ impl Decision {
         app: &AppState,
         organiser: &Organiser,
         request: requests::Decision,
-    ) -> Result<Done, Problem> {
+    ) -> Result<DecisionOutcome, Problem> {
         let actor = organiser.actor();
         match self {
             Self::Day(decision) => decision.carry_out(app, actor, request).await,

@@ -72,7 +72,7 @@ pub(super) async fn submit(
         confirm: Some(form.confirm).filter(|confirm| !confirm.is_empty()),
     };
     match decision.carry_out(&app, &user.organiser, request).await {
-        Ok(done) => Ok(redirect_done(&done.return_path, done.notice)),
+        Ok(outcome) => Ok(redirect_done(&outcome.return_path, outcome.notice)),
         Err(problem) => {
             page_with(
                 &app,

@@ -30,6 +30,7 @@ struct Page {
     frame: Frame,
     head: DashboardHeader,
     entries: Vec<Entry>,
+    /// Id of the event before which the next page of older events ends.
     next_before: Option<i64>,
     /// Users and teams: identifier and name.
     authors: Vec<(String, String)>,

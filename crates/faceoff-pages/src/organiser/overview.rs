@@ -62,18 +62,19 @@ struct StageSummary {
     id: StageId,
     name: StageName,
     phase: &'static str,
-    /// The latest day, with the number of done and of all evaluations.
+    /// The latest day, the number of its evaluations that have ended, and of all.
     latest: Option<(jiff::civil::Date, u32, usize)>,
     next_cutoff: Option<String>,
 }
 
 /// A team is listed if it uses at least this share of its upload quota, in percent.
 const NEARLY_FULL_PERCENT: u64 = 90;
-/// From so many wrong passwords on, organisers see them.
+/// Organisers see the number of wrong passwords from this number on.
 const MANY_WRONG_PASSWORDS: u32 = 20;
-/// Users who are named with their number of wrong passwords.
+/// Largest number of users who are named with their number of wrong passwords.
 const MAX_LISTED_NAMES: usize = 5;
 
+/// Items about the server: queue, clock, workers, passwords and storage. Returns also the number of running and of queued jobs, if known.
 async fn server_items(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Problem> {
     let mut items = Vec::new();
     let mut queue = None;
@@ -157,25 +158,25 @@ async fn server_items(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Prob
     Ok((items, queue))
 }
 
-/// Many wrong passwords: attempts to guess them, perhaps.
+/// An item if there were many wrong passwords in the last hour, which may be attempts to guess them.
 async fn wrong_passwords(app: &App) -> Result<Option<Item>, Problem> {
-    let wrong = app.passwords.wrong_passwords(app.config.clock.now());
-    if wrong.total() < MANY_WRONG_PASSWORDS {
+    let attempts = app.passwords.wrong_passwords(app.config.clock.now());
+    if attempts.total() < MANY_WRONG_PASSWORDS {
         return Ok(None);
     }
     let mut names = Vec::new();
-    for (user, count) in wrong.by_user.iter().take(MAX_LISTED_NAMES) {
+    for (user, count) in attempts.by_user.iter().take(MAX_LISTED_NAMES) {
         names.push(format!("{count} for {}", app.store.user(*user).await?.name));
     }
-    let others = wrong.by_user.iter().skip(MAX_LISTED_NAMES);
+    let others = attempts.by_user.iter().skip(MAX_LISTED_NAMES);
     let others: u32 = others.map(|(_, count)| count).sum();
     if others > 0 {
         names.push(format!("{others} for other users"));
     }
-    if wrong.unknown_names > 0 {
+    if attempts.unknown_names > 0 {
         names.push(format!(
             "{} for names without a password",
-            wrong.unknown_names
+            attempts.unknown_names
         ));
     }
     Ok(Some(Item {
@@ -184,7 +185,7 @@ async fn wrong_passwords(app: &App) -> Result<Option<Item>, Problem> {
         detail: format!(
             "{} within about an hour: {}. After five wrong passwords for a name, sign-ins with that name have to wait. Tokens, \
              sessions and new links still work.",
-            wrong.total(),
+            attempts.total(),
             names.join(", ")
         ),
         links: vec![("/organiser/access".into(), "Users and tokens".into())],
@@ -194,10 +195,10 @@ async fn wrong_passwords(app: &App) -> Result<Option<Item>, Problem> {
 async fn registration_and_question_items(app: &App) -> Result<Vec<Item>, Problem> {
     let mut items = Vec::new();
     let registrations = app.store.registrations().await?;
-    let waiting = registrations
+    let pending = registrations
         .iter()
         .filter(|registration| registration.state == RegistrationState::Pending);
-    for registration in waiting {
+    for registration in pending {
         items.push(Item {
             class: "waiting",
             title: format!("{} has registered", registration.team_name),
@@ -287,6 +288,7 @@ async fn failures(app: &App, day: StageDay) -> Result<Vec<Item>, Problem> {
     Ok(items.collect())
 }
 
+/// Items about a stage, and its line in the list of stages.
 async fn stage_items(app: &App, stage: Stage) -> Result<(Vec<Item>, StageSummary), Problem> {
     let now = app.config.clock.now();
     let phase = stage.phase(now);
@@ -370,8 +372,8 @@ pub(super) async fn page(
     let (mut items, queue) = server_items(&app).await?;
     let mut stages = Vec::new();
     for stage in app.store.stages().await? {
-        let (found, summary) = stage_items(&app, stage).await?;
-        items.extend(found);
+        let (items_of_stage, summary) = stage_items(&app, stage).await?;
+        items.extend(items_of_stage);
         stages.push(summary);
     }
     items.extend(registration_and_question_items(&app).await?);

@@ -29,9 +29,9 @@ struct Page {
     head: DashboardHeader,
     stage: StageView,
     form: StageForm,
-    /// Names and titles.
+    /// Names of the tasks' checkboxes, and titles of the tasks.
     task_checkboxes: Vec<(String, String)>,
-    /// All of the competition.
+    /// All profiles of the competition.
     profiles: Vec<Profile>,
     /// The name that confirms a change with consequences; the refusal lists them.
     confirm: Option<String>,

@@ -68,6 +68,7 @@ impl StageForm {
             .collect()
     }
 
+    /// Is the text of this input another one than in the other form?
     fn differs(&self, other: &Self, input: &Input) -> bool {
         match input.kind {
             InputKind::Checkbox => self.is_ticked(input.name) != other.is_ticked(input.name),

@@ -25,12 +25,13 @@ struct Page {
     head: DashboardHeader,
     stages: Vec<StageView>,
     form: StageForm,
-    /// Names and titles.
+    /// Names of the tasks' checkboxes, and titles of the tasks.
     task_checkboxes: Vec<(String, String)>,
-    /// All of the competition.
+    /// All profiles of the competition.
     profiles: Vec<Profile>,
     /// Always `None`: creating a stage needs no confirmation. `stage_fields.html` expects the field.
     confirm: Option<String>,
+    /// Was a form refused? Then it is shown open.
     is_refused: bool,
 }
 

@@ -17,6 +17,7 @@ struct Page {
     frame: Frame,
     head: DashboardHeader,
     disks: Vec<Disk>,
+    /// Free space below which the queue is paused, and whether a disk has less.
     min_free: String,
     is_short: bool,
     teams: Vec<StorageView>,

@@ -31,6 +31,7 @@ struct Page {
     frame: Frame,
     head: DashboardHeader,
     teams: Vec<TeamView>,
+    /// Registrations that wait for approval, and those that were approved or refused.
     pending: Vec<RegistrationView>,
     decided: Vec<RegistrationView>,
     divisions: Vec<DivisionName>,

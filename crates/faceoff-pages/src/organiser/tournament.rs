@@ -4,7 +4,7 @@ use super::{form_lines, tournaments::PATH};
 use crate::{
     dashboard_frame::{DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
     frame::{Frame, PageProblem},
-    game_row::{GameRow, GameState},
+    game_row::{GameRow, GameState, ResultDisplay},
     page_auth::PageOrganiser,
     tournament_text,
 };
@@ -34,9 +34,9 @@ struct Page {
     phase: String,
     format: String,
     last_round: String,
-    /// Teams that have not left.
+    /// Number of teams that have not left.
     teams: usize,
-    /// Games of the started rounds: with a result, and all.
+    /// Number of games of the started rounds: those with a result, and all that are not cancelled.
     played: u32,
     games: u32,
     /// Games without a result that have to be rerun.
@@ -52,7 +52,7 @@ struct Page {
 }
 
 impl Page {
-    /// A team cannot avoid disqualification by withdrawing first.
+    /// Can the organisers disqualify the team? Also after it has withdrawn: a team must not avoid disqualification by that.
     fn can_disqualify(&self, entrant: &EntrantView) -> bool {
         let has_started = !self.view.rounds.is_empty();
         let departure = entrant.departure.as_ref();
@@ -82,14 +82,17 @@ async fn page_with(
 ) -> Result<Response, PageProblem> {
     let state = TournamentState::find(app, id).await?;
     let view = tournament::view(&state)?;
-    let all_games = game::round_games(&state, Viewer::Organiser, None)?;
-    let all_games = all_games.iter().rev();
-    let all_games: Vec<GameRow> = all_games
-        .filter_map(|game| GameRow::new(game, false))
+    let round_games = game::round_games(&state, Viewer::Organiser, None)?;
+    // The last round first, without games that the departure of a team excluded.
+    let counting_games = round_games.iter().rev();
+    let counting_games: Vec<GameRow> = counting_games
+        .filter_map(|game| GameRow::new(game, ResultDisplay::Shown))
         .filter(|game| game.departed_team.is_none())
         .collect();
-    let select = |is_selected: fn(&GameState) -> bool| {
-        let selected = all_games.iter().filter(|game| is_selected(&game.state));
+    let rows_in = |is_selected: fn(&GameState) -> bool| {
+        let selected = counting_games
+            .iter()
+            .filter(|game| is_selected(&game.state));
         selected.cloned().collect::<Vec<_>>()
     };
     let phase = view.summary.phase;
@@ -109,8 +112,8 @@ async fn page_with(
         teams: teams.filter(|team| team.departure.is_none()).count(),
         played: progress.played,
         games: progress.games - progress.cancelled,
-        to_rerun: select(|state| matches!(state, GameState::Void | GameState::Failed)),
-        with_result: select(|state| matches!(state, GameState::Played { .. })),
+        to_rerun: rows_in(|state| matches!(state, GameState::Void | GameState::Failed)),
+        with_result: rows_in(|state| matches!(state, GameState::Played { .. })),
         is_closed: phase == TournamentPhase::Closed,
         is_round_running: phase == TournamentPhase::RoundRunning,
         can_start_round,

@@ -17,8 +17,9 @@ pub(super) struct TournamentForm {
     /// One name per line; empty: the teams that qualify.
     pub(super) teams: String,
     pub(super) format: String,
-    /// Of round robin and Swiss.
+    /// Number of rounds; of round robin and Swiss only.
     pub(super) rounds: String,
+    /// Number of groups, and of the teams of each group that advance to the final; of groups only.
     pub(super) groups: String,
     pub(super) advance: String,
     /// Checkbox: not sent if it is not ticked.
@@ -64,7 +65,7 @@ impl TournamentForm {
         &FORMATS
     }
 
-    /// Values and titles of the publication of recordings.
+    /// When recordings become public: values and titles.
     pub(super) fn publications(&self) -> [(&'static str, &'static str); 3] {
         Publication::ALL.map(|publication| {
             let title = match publication {

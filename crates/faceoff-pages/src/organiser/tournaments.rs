@@ -32,10 +32,10 @@ struct Row {
     summary: TournamentSummary,
     phase: String,
     teams: usize,
-    /// Games of the started rounds: with a result, and all.
+    /// Number of games of the started rounds: those with a result, and all that are not cancelled.
     played: u32,
     games: u32,
-    /// The pending decision.
+    /// The decision that the organisers have to take next, as a sentence.
     decision: Option<String>,
 }
 

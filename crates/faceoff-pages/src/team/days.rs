@@ -143,7 +143,7 @@ pub(super) fn charts(
 pub(super) struct TaskViolations {
     pub(super) task: Task,
     pub(super) episodes: u32,
-    /// In the order of the competition's kinds.
+    /// For each kind of violation of the competition, in its order: the number of episodes with one, and their share.
     pub(super) kinds: Vec<String>,
 }
 

@@ -25,7 +25,7 @@ pub(super) struct Cell {
     /// Symbol for won, lost or drawn.
     pub(super) symbol: &'static str,
     pub(super) class: &'static str,
-    /// Rest of the accessible name: won or lost, opponent, round.
+    /// The text that follows the label in the accessible name: won or lost, opponent, round.
     pub(super) description: String,
 }
 
@@ -49,6 +49,7 @@ impl CrossTable {
     }
 }
 
+/// The games of two teams, from the perspective of the first one.
 fn cells(own: TeamId, other: TeamId, games: &[&GameRow]) -> Vec<Cell> {
     let common = games.iter().filter_map(|game| match game.team_ids {
         [home, away] if home == own && away == other => Some((*game, 0)),
@@ -64,7 +65,7 @@ impl Cell {
             GameState::Played { score, winner } => {
                 let label = format!("{}:{}", score[side], score[1 - side]);
                 match winner {
-                    Some(won) if won == side => (label, "✓", "won", "won"),
+                    Some(winner) if winner == side => (label, "✓", "won", "won"),
                     Some(_) => (label, "✕", "lost", "lost"),
                     None => (label, "=", "drawn", "drawn"),
                 }

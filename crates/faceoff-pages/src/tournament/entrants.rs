@@ -65,25 +65,28 @@ fn rounds_of(
     team: TeamId,
     spoilers: &Spoilers,
 ) -> Vec<(SubmissionId, Vec<RoundNumber>)> {
-    let mut played = Vec::<(SubmissionId, Vec<RoundNumber>)>::new();
+    let mut rounds_of_submissions = Vec::<(SubmissionId, Vec<RoundNumber>)>::new();
     for round in &view.rounds {
         if is_hidden(view, round.number, spoilers) {
             continue;
         }
-        let own = round
+        let own_submission = round
             .submissions
             .iter()
             .find(|submission| submission.team == team);
-        let Some(own) = own else { continue };
-        match played.iter_mut().find(|(id, _)| *id == own.submission) {
+        let Some(own) = own_submission else { continue };
+        match rounds_of_submissions
+            .iter_mut()
+            .find(|(id, _)| *id == own.submission)
+        {
             Some((_, rounds)) => rounds.push(round.number),
-            None => played.push((own.submission, vec![round.number])),
+            None => rounds_of_submissions.push((own.submission, vec![round.number])),
         }
     }
-    played
+    rounds_of_submissions
 }
 
-/// Rounds by submission id, for the ratings.
+/// The rounds in which each submission plays, as text by its id, for the ratings.
 pub(super) fn rounds_by_submission(view: &TournamentView) -> BTreeMap<String, String> {
     let mut rounds = BTreeMap::<String, Vec<RoundNumber>>::new();
     for round in &view.rounds {

@@ -15,7 +15,7 @@ pub(super) struct RatingTable {
 
 pub(super) struct Row {
     pub(super) team: TeamName,
-    /// The rounds that the submission plays.
+    /// The rounds in which the team plays with the rated submission.
     pub(super) rounds: Option<String>,
     pub(super) rating: String,
     pub(super) interval: String,
@@ -66,6 +66,7 @@ fn rows(pool: &Pool, rounds: &BTreeMap<String, String>) -> Vec<Row> {
         .collect()
 }
 
+/// The interval as text. An end is `None` if the games do not bound the rating on that side.
 fn interval(ends: [Option<f64>; 2]) -> String {
     match ends {
         [Some(low), Some(high)] => format!("{low:.0} – {high:.0}"),

@@ -7,11 +7,11 @@ use faceoff_types::{RoundNumber, TeamName};
 pub(super) struct Round {
     pub(super) number: RoundNumber,
     pub(super) progress: String,
-    /// The pairings depend on hidden results.
+    /// Are the pairings hidden, because they would reveal hidden results?
     pub(super) is_hidden: bool,
     /// In the order of play.
     pub(super) games: Vec<GameRow>,
-    /// Teams without an opponent on a matchday.
+    /// Byes: matchday, and the team that has no opponent on it.
     pub(super) byes: Vec<(u32, TeamName)>,
     /// Teams of each group; empty without a group stage.
     pub(super) groups: Vec<Vec<TeamName>>,
@@ -27,13 +27,13 @@ impl Round {
         spoilers: &Spoilers,
     ) -> Self {
         let is_hidden = is_hidden(view, round.number, spoilers);
-        let own = games.iter().filter(|game| game.round == round.number);
+        let round_games = games.iter().filter(|game| game.round == round.number);
         let byes = round.byes.iter();
-        let mut shown = Self {
+        let mut schedule = Self {
             number: round.number,
             progress: progress_text(round),
             is_hidden,
-            games: own.cloned().collect(),
+            games: round_games.cloned().collect(),
             byes: byes
                 .map(|bye| (bye.matchday, bye.team_name.clone()))
                 .collect(),
@@ -41,11 +41,11 @@ impl Round {
             has_mirrored_pairs: view.rules.mirrored,
         };
         if is_hidden {
-            shown.games.clear();
-            shown.byes.clear();
-            shown.groups.clear();
+            schedule.games.clear();
+            schedule.byes.clear();
+            schedule.groups.clear();
         }
-        shown
+        schedule
     }
 }
 

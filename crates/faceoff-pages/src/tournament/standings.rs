@@ -12,7 +12,7 @@ pub(super) struct Standings {
     /// Best first.
     pub(super) rows: Vec<Row>,
     pub(super) has_byes: bool,
-    /// Rounds with a column of points.
+    /// Numbers of the rounds that have a column of points; none if there is one round only, and in groups and the final.
     pub(super) rounds: Vec<usize>,
 }
 
@@ -28,7 +28,7 @@ pub(super) struct Row {
     pub(super) losses: u32,
     /// Matchdays without an opponent.
     pub(super) byes: u32,
-    /// Scored and conceded.
+    /// Goals scored and conceded.
     pub(super) goals: [u64; 2],
     pub(super) difference: String,
     pub(super) penalty_points: String,

@@ -134,10 +134,10 @@ impl Simulator for PointMass {
             Some(Magnitude::Number(strength)) => strength,
             Some(other) => return Err(InvalidConditions::Magnitudes(format!("wind is {other}"))),
         };
-        let blows = conditions.profile == WINDY;
+        let is_windy = conditions.profile == WINDY;
         Ok(Box::new(Line {
             seed: conditions.seed,
-            wind_m_s2: if blows {
+            wind_m_s2: if is_windy {
                 strength_m_s2 * fraction(conditions.mismatch_seed)
             } else {
                 0.0
@@ -152,6 +152,7 @@ fn fraction(seed: Seed) -> f64 {
     f64::from(seed.as_bytes()[0]) / 255.0
 }
 
+/// Creates the world of each episode: a mass at a start position that the seed determines.
 struct Line {
     seed: Seed,
     wind_m_s2: f64,
@@ -186,6 +187,7 @@ impl WorldFactory for Line {
     }
 }
 
+/// The world of an episode.
 struct Mass {
     task: Task,
     wind_m_s2: f64,
@@ -216,8 +218,8 @@ impl World for Mass {
     }
 
     fn divergence(&self) -> Option<String> {
-        let is_lost = self.state[0].abs() > 100.0;
-        is_lost.then(|| "the mass is lost".to_owned())
+        let has_diverged = self.state[0].abs() > 100.0;
+        has_diverged.then(|| "the mass is lost".to_owned())
     }
 
     fn success(&self) -> bool {

@@ -1,4 +1,4 @@
-//! A site with a tournament, for tests: helpers that start rounds and run games.
+//! A site with a tournament named “Cup”, for tests: helpers that start rounds and run games.
 
 use super::fake_worker::{self, GameOutcome};
 use crate::site::{ADMIN, Answer, Site, TestTeam, string};
@@ -102,7 +102,7 @@ impl TestTournament {
         self.teams.insert(name.to_owned(), team);
     }
 
-    /// Claims the next game as a slot does; `None` if no game is queued.
+    /// Claims the next game as a slot does; `None` if no queued game may start.
     pub async fn claim(&self) -> Option<(JobClaim, Game, Seed)> {
         fake_worker::claim(&self.site).await
     }

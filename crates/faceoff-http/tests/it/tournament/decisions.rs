@@ -28,7 +28,7 @@ fn ranked_names(view: &Value) -> Vec<String> {
 
 #[tokio::test]
 async fn withdrawn_team_keeps_its_finished_rounds() {
-    // As in tournaments that earlier versions opened.
+    // By this rule, which tournaments of earlier versions have, a team leaves at once: its games of the running round do not count.
     let body = json!({ "rules": { "withdrawals": "at_once" } });
     let cup = TestTournament::open(&["A", "B", "C"], body).await;
     cup.start_round().await;
@@ -116,9 +116,9 @@ async fn withdrawn_team_plays_the_round_under_way() {
         );
     }
     cup.start_round().await;
-    let of_second = cup.games().await;
-    let of_second = of_second.iter().filter(|game| game["round"] == 2);
-    assert_eq!(of_second.count(), 1, "only B and C are paired");
+    let games = cup.games().await;
+    let of_round_2 = games.iter().filter(|game| game["round"] == 2);
+    assert_eq!(of_round_2.count(), 1, "only B and C are paired");
 }
 
 #[tokio::test]
@@ -301,13 +301,13 @@ async fn paused_tournament_finishes_running_games_only() {
     cup.commit(&claim, &game, seed, GameOutcome::goals(1, 0))
         .await;
     assert!(cup.claim().await.is_none());
-    let waiting = cup
+    let queued = cup
         .games()
         .await
         .into_iter()
         .find(|game| game["state"] == "queued")
         .unwrap();
-    assert!(string(&waiting["next"]).contains("paused"));
+    assert!(string(&queued["next"]).contains("paused"));
     cup.post("resume", json!({})).await.json(200);
     assert_eq!(cup.play(first_by_name_wins).await, 2);
 }

@@ -35,9 +35,9 @@ async fn own_side_is_available_at_once_and_both_once_published() {
         ("never", false, false),
     ] {
         let cup = TestTournament::start_round_robin(publishes).await;
-        let waiting = string(&cup.games().await[0]["id"]);
+        let queued = string(&cup.games().await[0]["id"]);
         assert_eq!(
-            file_statuses(&cup, &waiting, Some(ADMIN)).await,
+            file_statuses(&cup, &queued, Some(ADMIN)).await,
             [409; 4],
             "there is no recording yet"
         );

@@ -19,7 +19,7 @@ pub struct GameOutcome {
     pub goals: [u32; 2],
     pub fouls: [u32; 2],
     pub penalty_points: [f64; 2],
-    /// Parts of 500 control steps in which penalty points are counted; 90 in a whole game.
+    /// Length of the game in windows of 500 control steps, by which penalty points are divided for the tier; 90 in a whole game.
     pub windows: u32,
     pub forfeits: [bool; 2],
 }

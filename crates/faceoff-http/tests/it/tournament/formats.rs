@@ -9,7 +9,7 @@ use crate::site::{ADMIN, Site, result, string};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Home and away team of each game of a round.
+/// Home and away team of each game of this round.
 fn meetings(games: &[Value], round: u32) -> BTreeSet<(String, String)> {
     let round_games = games.iter().filter(|game| game["round"] == round);
     round_games.map(team_names).collect()
@@ -183,19 +183,19 @@ async fn mirrored_meeting_is_two_games_with_the_same_seed() {
     let first_game = cup.play_next(first_by_name_wins).await.unwrap();
     assert_eq!(cup.play(first_by_name_wins).await, 5);
     let games = cup.games().await;
-    for halves in games.chunks(2) {
-        assert_eq!(halves[0]["seed_label"], halves[1]["seed_label"]);
-        assert_eq!(halves[0]["meeting"], halves[1]["meeting"]);
+    for pair in games.chunks(2) {
+        assert_eq!(pair[0]["seed_label"], pair[1]["seed_label"]);
+        assert_eq!(pair[0]["meeting"], pair[1]["meeting"]);
         assert_eq!(
-            [&halves[0]["second_half"], &halves[1]["second_half"]],
+            [&pair[0]["second_half"], &pair[1]["second_half"]],
             [false, true]
         );
-        let (home, away) = team_names(&halves[0]);
-        assert_eq!(team_names(&halves[1]), (away, home));
+        let (home, away) = team_names(&pair[0]);
+        assert_eq!(team_names(&pair[1]), (away, home));
     }
     assert_eq!(first_game.purpose.schedule_entry().unwrap().pairing, 1);
     let standings = cup.view().await["tables"][0]["standings"].clone();
-    assert_eq!(standings[0]["points"], 12, "each half counts");
+    assert_eq!(standings[0]["points"], 12, "each game of a pair counts");
     let ratings = cup
         .site
         .get(&format!("{}/ratings", cup.path), None)

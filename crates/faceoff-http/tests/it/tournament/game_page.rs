@@ -219,7 +219,7 @@ async fn game_page_shows_statistics_of_its_clips() {
     assert!(texts(&hidden, "[aria-labelledby=possession]").is_empty());
 }
 
-/// The picture for cards of a game.
+/// The picture of a game for link previews.
 async fn card(cup: &TestTournament, game: &str, cookie: Option<&str>) -> Picture {
     let path = format!("/games/{game}/card.png");
     let mut request = cup.site.request(reqwest::Method::GET, &path, None);
@@ -232,35 +232,35 @@ async fn card(cup: &TestTournament, game: &str, cookie: Option<&str>) -> Picture
 #[tokio::test]
 async fn game_card_shows_no_result_that_is_hidden() {
     let cup = TestTournament::start_round_robin("at_release").await;
-    let open = string(&cup.games().await[0]["id"]);
-    let before = card(&cup, &open, None).await;
-    // As long as the replay that is added.
-    let short = |game: &Game, names: [&str; 2]| GameOutcome {
+    let id = string(&cup.games().await[0]["id"]);
+    let before = card(&cup, &id, None).await;
+    // Games of the length of the replay that is added to them.
+    let short_outcome = |game: &Game, names: [&str; 2]| GameOutcome {
         windows: STEPS / CHUNK_STEPS,
         penalty_points: [0.0; 2],
         ..first_by_name_wins(game, names)
     };
-    while let Some(game) = cup.play_next(short).await {
-        let id = game.id.to_string();
-        let without_replay = card(&cup, &id, None).await;
+    while let Some(game) = cup.play_next(short_outcome).await {
+        let played_id = game.id.to_string();
+        let without_replay = card(&cup, &played_id, None).await;
         add_clips(&cup, &game).await;
-        let with_replay = card(&cup, &id, None).await;
+        let with_replay = card(&cup, &played_id, None).await;
         assert!(with_replay.png != without_replay.png, "paths of the puck");
     }
-    let shown = card(&cup, &open, None).await;
+    let shown = card(&cup, &id, None).await;
     assert!(shown.png != before.png, "the result is public");
-    let hidden = card(&cup, &open, Some("spoilers=hidden")).await;
+    let hidden = card(&cup, &id, Some("spoilers=hidden")).await;
     assert!(hidden.png == before.png, "as before the game");
     for picture in [&shown, &hidden] {
         assert_eq!(picture.headers["vary"], "cookie");
     }
     assert_ne!(shown.headers["etag"], hidden.headers["etag"]);
-    let path = format!("/games/{open}/card.png?show=result");
+    let path = format!("/games/{id}/card.png?show=result");
     let request = cup.site.request(reqwest::Method::GET, &path, None);
     let request = request.header("cookie", "spoilers=hidden");
     let revealed = Picture::read(request.send().await.unwrap()).await;
     assert!(revealed.png == shown.png);
-    // The other games have other teams.
+    // Pictures of other games differ, since their teams do.
     let other = string(&cup.games().await[1]["id"]);
     assert!(card(&cup, &other, None).await.png != shown.png);
 }

@@ -173,8 +173,8 @@ async fn live_stream_waits_for_the_start_and_restarts_on_retry() {
         .await
         .unwrap();
     live.end_attempt(game.id, 1);
-    let broken = stream.next().await.unwrap();
-    assert_eq!(broken.data["kind"], "broken_off");
+    let aborted = stream.next().await.unwrap();
+    assert_eq!(aborted.data["kind"], "broken_off");
     assert_eq!(stream.next().await.unwrap().name, "waiting");
     let (_, retried, _) = cup.claim().await.unwrap();
     assert_eq!(retried.id, game.id);

@@ -27,7 +27,7 @@ fn paper_outcome(golden: &Value, round: u32, [home, away]: [&str; 2]) -> GameOut
         let pair_of = |field: &str| [number(&game[field][0]), number(&game[field][1])];
         let (goals, score) = (pair_of("goals"), pair_of("score"));
         GameOutcome {
-            // The tables have the final score only. It includes a point for every third foul of the opponent.
+            // The paper has goals and final score, but no fouls. The score includes a point for every third foul of the opponent.
             fouls: [3 * (score[1] - goals[1]), 3 * (score[0] - goals[0])],
             penalty_points: [0, 1].map(|side| game["penalty_points"][side].as_f64().unwrap()),
             ..GameOutcome::goals(goals[0], goals[1])
@@ -70,12 +70,12 @@ async fn tournament_of_the_paper_has_its_standings() {
         .post("entrants", json!({ "teams": ["CONFIRMTEAM"] }))
         .await;
     assert_eq!(entered.json(200)["entrants"].as_array().unwrap().len(), 7);
-    let second = cup.start_round().await;
-    assert_eq!(second["progress"]["games"], 21);
+    let second_round = cup.start_round().await;
+    assert_eq!(second_round["progress"]["games"], 21);
     assert_eq!(
-        second["byes"].as_array().unwrap().len(),
+        second_round["byes"].as_array().unwrap().len(),
         7,
-        "with an odd number of teams each has a bye"
+        "with an odd number of teams each has a bye in the round"
     );
     assert_eq!(cup.play(outcome).await, 21);
 
@@ -122,7 +122,7 @@ async fn tournament_of_the_paper_has_its_standings() {
     }
     assert_eq!((won_by_tier, won_without_lead), (19, 9));
 
-    // The scoring of a file with the same games gives the same standings.
+    // `faceoff score tournament`, which scores a file of games, gives the same standings.
     let entries: Vec<PlayedGame> = games.iter().map(played_game).collect();
     let scored = score_tournament(&entries);
     assert_eq!(
@@ -148,12 +148,12 @@ async fn tournament_of_the_paper_has_its_standings() {
         (&best["team"], &best["ci95"][1]),
         (&json!("AiRLIHockey"), &Value::Null)
     );
-    let second_round = cup
+    let games_of_round_2 = cup
         .site
         .get(&format!("{}/games?round=2", cup.path), Some(ADMIN))
         .await
         .json(200);
-    assert_eq!(second_round.as_array().unwrap().len(), 21);
+    assert_eq!(games_of_round_2.as_array().unwrap().len(), 21);
 }
 
 /// A game as `faceoff score tournament` reads it.

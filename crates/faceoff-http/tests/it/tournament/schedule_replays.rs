@@ -1,4 +1,5 @@
-//! Tests of replays of a tournament's whole schedule with other seeds, which show how certain its champion is.
+//! Tests of schedule replays: the whole schedule of a tournament is played again with other seeds, which shows how certain its champion
+//! is. They have nothing to do with the replays that show a recorded game.
 
 use super::{
     cup::{TestTournament, first_by_name_wins},
@@ -50,7 +51,7 @@ async fn repeated_schedules_give_the_champion_probabilities() {
             _ => first_by_name_wins(game, names),
         }
     };
-    // Four of the five replays, of three games each.
+    // Four of the five schedule replays, of three games each. The fifth is cancelled.
     for _ in 0..12 {
         cup.play_next(outcome).await.unwrap();
     }

@@ -102,7 +102,7 @@ async fn test_game_is_private_and_does_not_count() {
     let view = cup.view().await;
     assert_eq!(view["tables"][0]["standings"], json!([]));
     assert_eq!(cup.games().await, Vec::<Value>::new());
-    let listed_games = async |token: &str| {
+    let count_listed_games = async |token: &str| {
         let path = format!("{}/uncounted-games", cup.path);
         cup.site
             .get(&path, Some(token))
@@ -114,9 +114,9 @@ async fn test_game_is_private_and_does_not_count() {
     };
     assert_eq!(
         [
-            listed_games(cup.token("A")).await,
-            listed_games(cup.token("B")).await,
-            listed_games(ADMIN).await
+            count_listed_games(cup.token("A")).await,
+            count_listed_games(cup.token("B")).await,
+            count_listed_games(ADMIN).await
         ],
         [1, 0, 1]
     );
@@ -141,7 +141,7 @@ async fn daily_quota_of_test_games_applies_to_teams_only() {
         (&problem["limit"], &problem["used"]),
         (&json!(2), &json!(2))
     );
-    // The time from ten o'clock to midnight.
+    // It is ten o'clock, and the quota starts again at midnight.
     assert_eq!(refused.header("retry-after"), (14 * 3600).to_string());
     request_friendly_game(&cup, "A", "B")
         .await

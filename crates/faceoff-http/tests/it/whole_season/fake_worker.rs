@@ -58,8 +58,9 @@ fn random_outcome(
 /// A fake worker, with the outcomes of runs that are not scored yet.
 #[derive(Default)]
 pub struct FakeWorker {
+    /// Outcomes of runs whose scoring job has not been performed yet.
     unscored: HashMap<RunId, Vec<EpisodeOutcome>>,
-    /// The number of scored evaluations.
+    /// The number of evaluations that this worker has scored so far.
     pub scored: usize,
 }
 

@@ -5,7 +5,7 @@ use crate::site::{ADMIN, string};
 use faceoff_worker::update_due_days;
 use serde_json::{Value, json};
 
-// The days of the actions, counted from 0.
+// The days of the actions, counted from 0. What is done about the evaluations of a day is done on the morning after it.
 const RENAMING: i32 = 3;
 const WITHDRAWAL: i32 = 10;
 const PAUSE: i32 = 12;
@@ -24,7 +24,7 @@ const OUTAGE: i32 = 60;
 const EXTRA_EVALUATION: i32 = 66;
 const RETIREMENT: i32 = 80;
 
-/// Whether the server is down at the cutoff of this day, and for the whole evening.
+/// Is the server down at the cutoff of this day, and for the whole evening? Then the day is missed.
 pub fn is_down_at_cutoff(day: i32) -> bool {
     day == OUTAGE
 }
@@ -100,7 +100,7 @@ impl Season {
         self.teams[4].is_inactive = true;
     }
 
-    /// Pauses the queue, in which no job starts then, and resumes it.
+    /// Pauses the queue, checks that no job starts, and resumes it. The new submission of team 4 is the waiting job.
     async fn pause(&mut self) {
         self.upload(4, PAUSE as usize).await;
         self.teams[4].is_inactive = false;
@@ -200,7 +200,7 @@ impl Season {
         );
     }
 
-    /// The previous day was not finished at the next cutoff, for lack of capacity. That removes no row from the board.
+    /// Checks the overfull day on the morning after it: it stays open until the next cutoff, and the board keeps all its rows.
     async fn check_overfull_day(&mut self) {
         let day = OVERFULL_DAY;
         // The numbers of finished evaluations, of those that were not played, and of all.
@@ -230,7 +230,7 @@ impl Season {
         .await
         .unwrap();
         assert_eq!(states(self).await, (FINISHED_BEFORE_DEADLINE, 0, all));
-        // The next cutoff ends the overfull day. The clock goes back to the morning before it.
+        // A millisecond before the cutoff nothing has changed. The clock goes back to the morning.
         self.site.set_time(local_time(day + 1, 10));
         assert_eq!(self.teams_on_board(day).await.len(), self.active_teams());
     }
@@ -241,6 +241,7 @@ impl Season {
         self.post(&format!("/stages/{stage}/freeze"), body)
             .await
             .json(200);
+        // The overfull day ended at its deadline, the next cutoff. Its other evaluations were not played.
         let evaluations = self.evaluations(OVERFULL_DAY).await;
         let not_played = evaluations
             .iter()
@@ -316,7 +317,7 @@ impl Season {
             .json(200);
     }
 
-    /// Datasets of the first days are removed; their results stay.
+    /// Checks that most datasets of an early day are removed: each team keeps those of its last five days and of its best one.
     async fn check_retention(&self) {
         let days = [RETENTION_SET, DAYS - 1].map(async |day| {
             let mut retained = 0;
@@ -330,14 +331,18 @@ impl Season {
             }
             retained
         });
-        let [first, last] = days;
-        let (first, last) = (first.await, last.await);
+        let [early_day, last_day] = days;
+        let (kept_early, kept_last) = (early_day.await, last_day.await);
         let max_retained = self.active_teams() / 4;
         assert!(
-            first < max_retained,
-            "{first} of day {RETENTION_SET} are kept"
+            kept_early < max_retained,
+            "{kept_early} of day {RETENTION_SET} are kept"
         );
-        assert_eq!(last, self.active_teams(), "the last stage has no retention");
+        assert_eq!(
+            kept_last,
+            self.active_teams(),
+            "the last stage has no retention"
+        );
     }
 
     /// After the last day: reveals the blind stage, signs off each stage, and closes the season.

@@ -22,7 +22,7 @@ const DAYS_PER_SUBMISSION: usize = 10;
 /// Episodes per task: a tenth of a real stage's. The bound of the database's size is scaled by that, and by the number of
 /// teams: here 20, in a real season 40.
 const EPISODES: u32 = 100;
-/// One shard (the part of a task that one job runs) per task. A real stage has smaller shards, but the rows that stay in the
+/// One shard (the episodes of a task that one job runs) per task. A real stage has smaller shards, but the rows that stay in the
 /// database do not depend on that.
 const EPISODES_PER_SHARD: u32 = EPISODES;
 /// A time zone with a change to summer time on 2026-03-29.
@@ -114,7 +114,7 @@ impl Season {
             .await
     }
 
-    /// Gets a resource as an organiser.
+    /// Reads a resource as an organiser.
     pub async fn get(&self, path: &str) -> Value {
         let answer = self.site.get(&format!("/api/v1{path}"), Some(ADMIN)).await;
         answer.json(200)
@@ -161,7 +161,7 @@ impl Season {
         self.worker.perform_validations(&self.site).await;
     }
 
-    /// Uploads a submission of the team with this index. Other versions are other bundles.
+    /// Uploads a submission of the team with this index. Each version has another bundle.
     pub async fn upload(&self, index: usize, version: usize) -> Value {
         let mut bundle = GZIP.to_vec();
         bundle.extend(format!("agent {index} of day {version}").bytes());

@@ -1,4 +1,4 @@
-//! Rendering of Markdown: escaped HTML, links, anchors, tables and sections for the search.
+//! Tests of the rendering of Markdown: escaped HTML, links, anchors, tables and sections for the search.
 
 use super::*;
 

@@ -15,16 +15,16 @@ pub(in crate::docs) struct Piece {
 
 /// The text around a byte position.
 pub(super) fn snippet(text: &str, position: usize, is_match: impl Fn(&str) -> bool) -> Vec<Piece> {
-    let shown = range(text, position);
-    let mut snippet = pieces(&text[shown.clone()], is_match);
+    let shown_range = range(text, position);
+    let mut snippet = pieces(&text[shown_range.clone()], is_match);
     let ellipsis = || Piece {
         text: "…".into(),
         is_match: false,
     };
-    if shown.start > 0 {
+    if shown_range.start > 0 {
         snippet.insert(0, ellipsis());
     }
-    if shown.end < text.len() {
+    if shown_range.end < text.len() {
         snippet.push(ellipsis());
     }
     snippet
@@ -48,7 +48,8 @@ pub(super) fn pieces(text: &str, is_match: impl Fn(&str) -> bool) -> Vec<Piece> 
     let mut pieces: Vec<Piece> = Vec::new();
     // Up to here the text is split.
     let mut done = 0;
-    let mut mark = |range: Range<usize>| {
+    // Splits off a match, and the text before it.
+    let mut push_match = |range: Range<usize>| {
         for (range, is_match) in [(done..range.start, false), (range.clone(), true)] {
             if !range.is_empty() {
                 let text = text[range].to_owned();
@@ -59,16 +60,16 @@ pub(super) fn pieces(text: &str, is_match: impl Fn(&str) -> bool) -> Vec<Piece> 
     };
     for word in words(text) {
         if is_match(&text[word.clone()]) {
-            mark(word);
+            push_match(word);
             continue;
         }
         for part in parts(&text[word.clone()]) {
             let part = word.start + part.start..word.start + part.end;
             if is_match(&text[part.clone()]) {
-                mark(part);
+                push_match(part);
             }
         }
     }
-    mark(text.len()..text.len());
+    push_match(text.len()..text.len());
     pieces
 }

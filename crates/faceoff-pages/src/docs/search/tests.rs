@@ -1,4 +1,4 @@
-//! The search: ranking, forms of words, typos, synonyms, and the texts of results.
+//! Tests of the search: ranking, forms of words, typos, synonyms, and the texts of results.
 
 use super::{snippet::SNIPPET_BYTES, *};
 

@@ -1,4 +1,4 @@
-//! The words of the documentation, and where they stand.
+//! The words of the documentation, and where they occur. Words are indexed by *stem*, the part that the forms of a word share.
 
 use super::super::{
     sections::Section,
@@ -15,6 +15,7 @@ const MIN_CORRECTED: usize = 5;
 /// Occurrences of a stem in a section.
 #[derive(Debug)]
 pub(super) struct Posting {
+    /// Index of the section.
     pub(super) section: usize,
     /// In the title of the page.
     pub(super) in_title: bool,
@@ -29,6 +30,7 @@ pub(super) struct Posting {
 /// A stem that stands for a word of the query.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Term {
+    /// Index of the stem in the vocabulary.
     pub(super) stem: usize,
     /// True for a synonym of a word that the documentation has itself. Its matches rank below those of the word.
     pub(super) is_secondary: bool,
@@ -50,7 +52,7 @@ pub(super) struct Vocabulary {
     postings: Vec<Vec<Posting>>,
     /// Each word, with the number of its occurrences.
     words: BTreeMap<String, u32>,
-    /// Words of the documentation in place of a stem.
+    /// By the stem of a searched word: words of the documentation that are searched beside it.
     synonyms: HashMap<String, &'static [&'static str]>,
 }
 
@@ -165,16 +167,16 @@ impl Vocabulary {
     }
 
     fn forms_and_synonyms(&self, word: &str) -> Vec<Term> {
-        let word = stem(word);
-        let others = self.synonyms.get(&word).copied().unwrap_or_default();
-        let same = self.stems.get(&word).copied();
-        let others = others.iter().filter_map(|other| self.stem_of(other));
-        let others = others.map(|stem| Term {
+        let word_stem = stem(word);
+        let synonyms = self.synonyms.get(&word_stem).copied().unwrap_or_default();
+        let own_index = self.stems.get(&word_stem).copied();
+        let synonyms = synonyms.iter().filter_map(|synonym| self.stem_of(synonym));
+        let synonyms = synonyms.map(|stem| Term {
             stem,
-            is_secondary: same.is_some(),
+            is_secondary: own_index.is_some(),
         });
-        let same = same.map(Term::of_query);
-        same.into_iter().chain(others).collect()
+        let own_term = own_index.map(Term::of_query);
+        own_term.into_iter().chain(synonyms).collect()
     }
 
     fn words_beginning_with(&self, beginning: &str) -> Vec<Term> {
@@ -189,16 +191,16 @@ impl Vocabulary {
         stems.into_iter().map(Term::of_query).collect()
     }
 
-    /// The most frequent word that differs by a typo, or a word with synonyms.
+    /// The most frequent word of the documentation that differs by a typo; else a word that has synonyms there.
     fn correct(&self, word: &str) -> Option<&str> {
         let is_near = |other: &str| is_one_typo(word, other);
         if word.len() < MIN_CORRECTED {
             return None;
         }
-        let near = self.words.iter().filter(|(other, _)| is_near(other));
-        let frequent = near.max_by_key(|(_, count)| **count);
-        let frequent = frequent.map(|(word, _)| word.as_str());
-        let named = SYNONYMS.iter().map(|(other, _)| *other);
-        frequent.or_else(|| named.into_iter().find(|other| is_near(other)))
+        let near_words = self.words.iter().filter(|(other, _)| is_near(other));
+        let most_frequent = near_words.max_by_key(|(_, count)| **count);
+        let most_frequent = most_frequent.map(|(word, _)| word.as_str());
+        let words_with_synonyms = SYNONYMS.iter().map(|(other, _)| *other);
+        most_frequent.or_else(|| words_with_synonyms.into_iter().find(|other| is_near(other)))
     }
 }

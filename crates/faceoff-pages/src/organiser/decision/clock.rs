@@ -1,6 +1,6 @@
 //! The decision that the system clock is right after it was set.
 
-use super::preview::{DecisionPreview, Done};
+use super::preview::{DecisionOutcome, DecisionPreview};
 use faceoff_api::requests;
 use faceoff_service::{app::AppState, problem::Problem, services::clock_step};
 use faceoff_store::Actor;
@@ -28,8 +28,8 @@ impl ClockDecision {
         app: &AppState,
         actor: Actor,
         request: requests::Decision,
-    ) -> Result<Done, Problem> {
+    ) -> Result<DecisionOutcome, Problem> {
         clock_step::accept_step(app, actor, request.confirm.as_deref()).await?;
-        Ok(Done::new("clock-accepted", OVERVIEW_PATH))
+        Ok(DecisionOutcome::new("clock-accepted", OVERVIEW_PATH))
     }
 }

@@ -1,6 +1,6 @@
-//! Decisions about an evaluation day: start today's, make up for a missed one, or void one.
+//! Decisions about an evaluation day: start today's, evaluate a missed one later, or void one.
 
-use super::preview::{DecisionPreview, Done, PUBLIC_REASON, day_page};
+use super::preview::{DecisionOutcome, DecisionPreview, PUBLIC_REASON, day_page};
 use faceoff_api::requests;
 use faceoff_service::{
     app::AppState,
@@ -47,7 +47,7 @@ impl DayDecision {
             Self::Start(id) => {
                 let stage = app.store.stage(id).await?;
                 let forecasts = capacity::build(app, id).await?.days;
-                let next = forecasts
+                let next_forecast = forecasts
                     .into_iter()
                     .rfind(|forecast| !forecast.is_under_way);
                 let day = stage.day(app.config.clock.now());
@@ -58,7 +58,7 @@ impl DayDecision {
                          you cannot start it a second time. Later uploads will be evaluated on the next evaluation day. {}",
                         day.date,
                         stage.name,
-                        next.map_or_else(String::new, |next| next.summary)
+                        next_forecast.map_or_else(String::new, |forecast| forecast.summary)
                     ),
                     button: "Start the day",
                     ..DecisionPreview::new(day_page(day))
@@ -72,7 +72,7 @@ impl DayDecision {
         app: &AppState,
         actor: Actor,
         request: requests::Decision,
-    ) -> Result<Done, Problem> {
+    ) -> Result<DecisionOutcome, Problem> {
         let reason = request.reason.as_str();
         let (notice, day) = match self {
             Self::Start(id) => (
@@ -88,6 +88,6 @@ impl DayDecision {
                 ("day-voided", day)
             }
         };
-        Ok(Done::new(notice, day_page(day)))
+        Ok(DecisionOutcome::new(notice, day_page(day)))
     }
 }

@@ -1,6 +1,6 @@
 //! Decisions about an evaluation: void, cancel or repeat it, or grant an extra one.
 
-use super::preview::{DecisionPreview, Done, PUBLIC_REASON, day_page};
+use super::preview::{DecisionOutcome, DecisionPreview, PUBLIC_REASON, day_page};
 use crate::format;
 use faceoff_api::{
     requests::{self, NewExtraEvaluation},
@@ -23,7 +23,7 @@ pub(in crate::organiser) enum EvaluationDecision {
     Extra(StageDay, TeamId),
 }
 
-/// Readers of a reason that only the team sees.
+/// Value of `reason_readers` for a reason that only the team and organisers see.
 const TEAM_REASON: &str = "visible to the team";
 
 async fn evaluation(app: &AppState, id: EvaluationId) -> Result<EvaluationView, Problem> {
@@ -110,7 +110,7 @@ impl EvaluationDecision {
         app: &AppState,
         actor: Actor,
         request: requests::Decision,
-    ) -> Result<Done, Problem> {
+    ) -> Result<DecisionOutcome, Problem> {
         let reason = request.reason.as_str();
         let (notice, evaluation) = match self {
             Self::Void(id) => (
@@ -127,15 +127,16 @@ impl EvaluationDecision {
             ),
             Self::Extra(day, team) => {
                 let requests::Decision { reason, confirm } = request;
-                let new = NewExtraEvaluation {
+                let request = NewExtraEvaluation {
                     team,
                     reason,
                     confirm,
                 };
-                let extra = evaluations::grant_extra_evaluation(app, actor, day, &new).await?;
-                ("extra-evaluation", extra)
+                let evaluation =
+                    evaluations::grant_extra_evaluation(app, actor, day, &request).await?;
+                ("extra-evaluation", evaluation)
             }
         };
-        Ok(Done::new(notice, day_page(evaluation.stage_day)))
+        Ok(DecisionOutcome::new(notice, day_page(evaluation.stage_day)))
     }
 }

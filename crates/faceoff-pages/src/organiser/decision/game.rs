@@ -1,6 +1,6 @@
 //! Decisions about a game of a tournament: void its result, or rerun it.
 
-use super::preview::{DecisionPreview, Done, PUBLIC_REASON};
+use super::preview::{DecisionOutcome, DecisionPreview, PUBLIC_REASON};
 use crate::organiser::tournament::page_path;
 use faceoff_api::requests;
 use faceoff_service::{
@@ -47,7 +47,7 @@ impl GameDecision {
         app: &AppState,
         actor: Actor,
         request: requests::Decision,
-    ) -> Result<Done, Problem> {
+    ) -> Result<DecisionOutcome, Problem> {
         let (game, notice) = match self {
             Self::Void(id) => {
                 let voided = games::void_game(app, actor, id, &request).await?;
@@ -55,6 +55,6 @@ impl GameDecision {
             }
             Self::Rerun(id) => (games::rerun_game(app, actor, id).await?, "game-rerun"),
         };
-        Ok(Done::new(notice, page_path(game.tournament)))
+        Ok(DecisionOutcome::new(notice, page_path(game.tournament)))
     }
 }

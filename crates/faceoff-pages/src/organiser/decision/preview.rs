@@ -7,10 +7,11 @@ use faceoff_types::StageDay;
 /// Content of the page of a decision.
 pub(in crate::organiser) struct DecisionPreview {
     pub(in crate::organiser) title: String,
+    /// What the decision will do, as sentences.
     pub(in crate::organiser) effects: String,
     /// Who can read the reason; `None` if the decision needs no reason.
     pub(in crate::organiser) reason_readers: Option<&'static str>,
-    /// The name that confirms the decision, if a confirmation is needed.
+    /// The name that the organiser has to type as confirmation, if one is needed.
     pub(in crate::organiser) confirm_name: Option<String>,
     pub(in crate::organiser) button: &'static str,
     /// The decision is irreversible or affects a team at once.
@@ -20,7 +21,7 @@ pub(in crate::organiser) struct DecisionPreview {
 }
 
 impl DecisionPreview {
-    /// A decision without a reason, a confirmation and consequences, still without its texts.
+    /// A decision that needs no reason and no confirmation, and is not grave. The caller sets its texts.
     pub(super) fn new(return_path: impl Into<String>) -> Self {
         Self {
             title: String::new(),
@@ -44,15 +45,15 @@ impl DecisionPreview {
     }
 }
 
-/// A decision that was carried out.
-pub(in crate::organiser) struct Done {
-    /// Key of the notice that says so.
+/// What the browser gets after a decision was carried out: a redirect with a notice.
+pub(in crate::organiser) struct DecisionOutcome {
+    /// Key of the notice on that page, in `dashboard_frame.rs`.
     pub(in crate::organiser) notice: &'static str,
-    /// Path of the page to return to.
+    /// Path of the page to which the browser is redirected.
     pub(in crate::organiser) return_path: String,
 }
 
-impl Done {
+impl DecisionOutcome {
     pub(super) fn new(notice: &'static str, return_path: impl Into<String>) -> Self {
         Self {
             notice,
@@ -61,7 +62,7 @@ impl Done {
     }
 }
 
-/// Readers of a reason that everyone can see.
+/// Value of `reason_readers` for a reason that everyone can see.
 pub(super) const PUBLIC_REASON: &str = "public";
 
 /// Path of the page of an evaluation day.

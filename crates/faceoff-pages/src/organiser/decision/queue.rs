@@ -1,6 +1,6 @@
 //! Decisions about the queue of jobs: pause it or resume it.
 
-use super::preview::{DecisionPreview, Done, PUBLIC_REASON};
+use super::preview::{DecisionOutcome, DecisionPreview, PUBLIC_REASON};
 use crate::format::utc_minute;
 use faceoff_api::requests;
 use faceoff_service::{
@@ -54,7 +54,7 @@ impl QueueDecision {
         app: &AppState,
         actor: Actor,
         request: requests::Decision,
-    ) -> Result<Done, Problem> {
+    ) -> Result<DecisionOutcome, Problem> {
         let reason = request.reason.as_str();
         let notice = match self {
             Self::Pause => {
@@ -66,6 +66,6 @@ impl QueueDecision {
                 "resumed"
             }
         };
-        Ok(Done::new(notice, QUEUE_PATH))
+        Ok(DecisionOutcome::new(notice, QUEUE_PATH))
     }
 }

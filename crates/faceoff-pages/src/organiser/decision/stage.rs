@@ -1,6 +1,6 @@
 //! Decisions about a stage and its result: freeze or unfreeze its boards, start its final day, or sign it off.
 
-use super::preview::{DecisionPreview, Done, PUBLIC_REASON};
+use super::preview::{DecisionOutcome, DecisionPreview, PUBLIC_REASON};
 use faceoff_api::requests;
 use faceoff_service::{app::AppState, problem::Problem, services::stage_results};
 use faceoff_store::Actor;
@@ -68,7 +68,7 @@ impl StageDecision {
         app: &AppState,
         actor: Actor,
         request: requests::Decision,
-    ) -> Result<Done, Problem> {
+    ) -> Result<DecisionOutcome, Problem> {
         let reason = request.reason.as_str();
         let notice = match self {
             Self::Freeze(id) => {
@@ -89,6 +89,6 @@ impl StageDecision {
                 "signed-off"
             }
         };
-        Ok(Done::new(notice, self.return_path()))
+        Ok(DecisionOutcome::new(notice, self.return_path()))
     }
 }

@@ -1,6 +1,6 @@
 //! Decisions about teams and registrations: disqualify or reinstate a team, approve or refuse a registration.
 
-use super::preview::{DecisionPreview, Done, PUBLIC_REASON};
+use super::preview::{DecisionOutcome, DecisionPreview, PUBLIC_REASON};
 use faceoff_api::requests;
 use faceoff_service::{
     app::AppState,
@@ -45,9 +45,9 @@ impl TeamDecision {
                 })
             }
             Self::Approve(id) | Self::Refuse(id) => {
-                let mut all = app.store.registrations().await?.into_iter();
-                let found = all.find(|registration| registration.id == id);
-                let name = found
+                let mut registrations = app.store.registrations().await?.into_iter();
+                let registration = registrations.find(|registration| registration.id == id);
+                let name = registration
                     .ok_or_else(|| Problem::not_found("registration"))?
                     .team_name;
                 let approves = matches!(self, Self::Approve(_));
@@ -81,7 +81,7 @@ impl TeamDecision {
         app: &AppState,
         organiser: &Organiser,
         request: requests::Decision,
-    ) -> Result<Done, Problem> {
+    ) -> Result<DecisionOutcome, Problem> {
         let actor = organiser.actor();
         let reason = request.reason.as_str();
         let notice = match self {
@@ -103,6 +103,6 @@ impl TeamDecision {
                 "refused"
             }
         };
-        Ok(Done::new(notice, TEAMS_PATH))
+        Ok(DecisionOutcome::new(notice, TEAMS_PATH))
     }
 }

@@ -1,6 +1,6 @@
 //! Decisions about a tournament: start its next round, pause, resume or close it, and let a team leave it.
 
-use super::preview::{DecisionPreview, Done, PUBLIC_REASON};
+use super::preview::{DecisionOutcome, DecisionPreview, PUBLIC_REASON};
 use crate::organiser::tournament::page_path;
 use faceoff_api::requests;
 use faceoff_service::{
@@ -33,7 +33,7 @@ const fn departure(team: TeamId, kind: DepartureKind) -> PlannedDeparture<'stati
     }
 }
 
-/// The teams among which the round is drawn.
+/// The teams among which the games of the round are drawn, as text.
 fn round_teams(record: &TournamentRecord, number: RoundNumber) -> String {
     let has_groups = matches!(
         record.tournament.rules.format,
@@ -122,7 +122,7 @@ impl TournamentDecision {
         app: &AppState,
         actor: Actor,
         request: requests::Decision,
-    ) -> Result<Done, Problem> {
+    ) -> Result<DecisionOutcome, Problem> {
         let confirm = request.confirm.as_deref();
         let notice = match self {
             Self::StartRound(id, number) => {
@@ -150,6 +150,6 @@ impl TournamentDecision {
                 "team-left"
             }
         };
-        Ok(Done::new(notice, page_path(self.tournament())))
+        Ok(DecisionOutcome::new(notice, page_path(self.tournament())))
     }
 }

@@ -1,6 +1,6 @@
 //! Decisions about remote workers, which run jobs on other machines: ban one or readmit it.
 
-use super::preview::{DecisionPreview, Done};
+use super::preview::{DecisionOutcome, DecisionPreview};
 use faceoff_api::requests;
 use faceoff_service::{app::AppState, problem::Problem, services::workers};
 use faceoff_store::Actor;
@@ -44,7 +44,7 @@ impl WorkerDecision {
         app: &AppState,
         actor: Actor,
         request: requests::Decision,
-    ) -> Result<Done, Problem> {
+    ) -> Result<DecisionOutcome, Problem> {
         let notice = match self {
             Self::Ban(worker) => {
                 workers::ban_worker(app, actor, worker, &request.reason).await?;
@@ -55,6 +55,6 @@ impl WorkerDecision {
                 "worker-readmitted"
             }
         };
-        Ok(Done::new(notice, WORKERS_PATH))
+        Ok(DecisionOutcome::new(notice, WORKERS_PATH))
     }
 }

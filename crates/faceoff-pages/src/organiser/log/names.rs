@@ -55,7 +55,8 @@ impl Names {
         Ok(names)
     }
 
-    /// The name of a subject that belongs to teams; `None` if it was deleted.
+    /// The name of a subject that is named after its team or teams, such as “Alpha’s evaluation of 2026-03-01”. `None` if the teams are
+    /// not known.
     fn of_context(&self, subject: Subject, context: SubjectContext) -> Option<String> {
         let team = |id: faceoff_types::TeamId| self.team(&id.to_string());
         Some(match (subject, context) {

@@ -11,15 +11,15 @@ use std::{fmt::Display, str::FromStr};
 
 /// An input of the form.
 pub(in crate::organiser) struct Input {
-    /// That of the setting in the API, if it is the setting's only input.
+    /// The name of the setting in the API, if this is the setting's only input.
     pub(in crate::organiser) name: &'static str,
     pub(in crate::organiser) label: &'static str,
     /// A hint beside the label: unit or format; empty if the label says enough.
     pub(in crate::organiser) hint: &'static str,
     pub(in crate::organiser) kind: InputKind,
-    /// The text for a stage.
+    /// The text that the input shows for a stage.
     pub(super) text: fn(&Stage) -> String,
-    /// Reads the setting, also from its other inputs.
+    /// Reads the setting of this input from the form. A setting with several inputs, such as the schedule, is read from all of them.
     pub(super) read: fn(&StageForm, &mut StagePatch) -> Result<(), Problem>,
 }
 
@@ -28,7 +28,7 @@ pub(in crate::organiser) enum InputKind {
     OptionalText,
     /// In the stage's time zone, in the format of an input `datetime-local`: `2026-03-01T10:00`. May be empty.
     DateTime,
-    /// A whole number from this one on.
+    /// A whole number that is at least this one.
     Number(u32),
     /// A choice among the profiles of the competition.
     ProfileChoice,
@@ -39,11 +39,11 @@ pub(in crate::organiser) enum InputKind {
 
 /// Inputs that are shown together.
 pub(in crate::organiser) struct InputGroup {
-    /// Empty: without a border.
+    /// Title of the group; empty for a group without title and border.
     pub(in crate::organiser) legend: &'static str,
     pub(in crate::organiser) hint: &'static str,
     pub(super) inputs: &'static [Input],
-    /// Followed by a checkbox for each task.
+    /// Is the group followed by a checkbox for each task?
     pub(in crate::organiser) has_tasks: bool,
 }
 
