@@ -1,4 +1,4 @@
-//! The C function `hypotf`, so that the program also starts on systems with glibc 2.34, such as RHEL 9.
+//! The C function `hypotf` (√(x² + y²)), as part of this program, so that it also starts on systems with glibc 2.34, such as RHEL 9.
 //!
 //! resvg calls it for groups with filters. glibc has had two versions of it since 2.35, and a program linked with a newer glibc asks for the
 //! second. The linker prefers this one.
