@@ -35,7 +35,8 @@ impl TextStyle {
 
     #[must_use]
     pub fn width_px(&self, text: &str) -> f64 {
-        let advances = characters_with_width(text).map(|c| self.weight.advance_em(self.weight.shape(c)));
+        let advances =
+            characters_with_width(text).map(|c| self.weight.advance_em(self.weight.shape(c)));
         self.size_px * advances.sum::<f64>()
     }
 
@@ -183,7 +184,10 @@ mod tests {
         let text = "Grundgesetz Hockey";
         let full_width = REGULAR.width_px(text);
         assert_eq!(REGULAR.truncated(text, full_width), text);
-        assert_eq!(REGULAR.truncated(text, full_width - 1.0), "Grundgesetz Hock…");
+        assert_eq!(
+            REGULAR.truncated(text, full_width - 1.0),
+            "Grundgesetz Hock…"
+        );
         let width_of_first_word = REGULAR.width_px("Grundgesetz …");
         assert_eq!(REGULAR.truncated(text, width_of_first_word), "Grundgesetz…");
         assert_eq!(REGULAR.truncated(text, 1.0), "");
@@ -229,7 +233,8 @@ mod tests {
             "1 – 2 ≤ 3 … “x” €",
         ] {
             for weight in [Weight::Regular, Weight::Semibold] {
-                let without_glyph: Vec<char> = text.chars().filter(|c| !weight.covers(*c)).collect();
+                let without_glyph: Vec<char> =
+                    text.chars().filter(|c| !weight.covers(*c)).collect();
                 assert!(without_glyph.is_empty(), "{without_glyph:?}");
             }
         }

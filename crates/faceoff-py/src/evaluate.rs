@@ -155,7 +155,10 @@ impl Evaluation {
                     let mut times = StepTimes::for_steps(steps);
                     // The policy was not timed, so each step counts as 0 s.
                     (0..steps).for_each(|_| times.add(0.0));
-                    (task, score_task(&competition, &outcomes, &times, tier_bounds))
+                    (
+                        task,
+                        score_task(&competition, &outcomes, &times, tier_bounds),
+                    )
                 })
                 .collect();
             let ruleset = faceoff_airhockey::RULESET;

@@ -49,7 +49,12 @@ impl Motion {
             Column::new("puck_vy", "m/s", PUCK_SPEED_RESOLUTION_M_S, 1),
         ];
         columns.extend(joint_columns("q", "rad", JOINT_ANGLE_RESOLUTION_RAD, 2));
-        columns.extend(joint_columns("dq", "rad/s", JOINT_SPEED_RESOLUTION_RAD_S, 1));
+        columns.extend(joint_columns(
+            "dq",
+            "rad/s",
+            JOINT_SPEED_RESOLUTION_RAD_S,
+            1,
+        ));
         columns.extend([1, 2].map(|axis| {
             Column::new(
                 format!("universal_{axis}"),
@@ -59,7 +64,12 @@ impl Motion {
             )
         }));
         if has_opponent {
-            columns.extend(joint_columns("opponent_q", "rad", JOINT_ANGLE_RESOLUTION_RAD, 2));
+            columns.extend(joint_columns(
+                "opponent_q",
+                "rad",
+                JOINT_ANGLE_RESOLUTION_RAD,
+                2,
+            ));
         }
         Self {
             columns,

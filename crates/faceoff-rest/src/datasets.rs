@@ -211,7 +211,7 @@ async fn find_released(
         } => {
             check_released(app, &evaluation).await?;
             let exists = app.store.artifacts().size_bytes(dataset).await?.is_some();
-            // The file of a removed dataset may be kept as evidence, say of a disqualified team: organisers can download it as long as it exists.
+            // The file of a removed dataset may be kept as evidence, say of a disqualified team: organisers can download it then.
             if let Some(removed) = &evaluation.dataset_removed
                 && !(viewer == Viewer::Organiser && exists)
             {

@@ -8,9 +8,9 @@ mod paged_lists;
 mod responses;
 mod unsigned_integers;
 
+pub(super) use conditional_requests::{FileHeaders, TagHeader};
 use faceoff_service::problem::ProblemBody;
 use faceoff_types::Competition;
-pub(super) use conditional_requests::{FileHeaders, TagHeader};
 use serde_json::Value;
 use utoipa::{
     Modify, OpenApi, PartialSchema, ToSchema,

@@ -20,7 +20,7 @@ use game::{GameOrigin, ReplayableGame};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use rayon::prelude::*;
-use rows::{GameRow, GameArrays, flatten, games_with_rows};
+use rows::{GameArrays, GameRow, flatten, games_with_rows};
 use settings::GameSettings;
 use std::sync::Arc;
 

@@ -80,7 +80,8 @@ impl Linearisation {
         let compensation = least_change(&self.columns, end_effector_shift, weight);
         let null_space_change: [f64; JOINTS] =
             from_fn(|joint| raising_change[joint] - compensation[joint]);
-        let null_space_fraction = self.deficit / inner_product(&self.rise, &null_space_change).max(1e-3);
+        let null_space_fraction =
+            self.deficit / inner_product(&self.rise, &null_space_change).max(1e-3);
         from_fn(|joint| step[joint] + null_space_fraction * null_space_change[joint])
     }
 }
