@@ -14,7 +14,7 @@ use crate::{
     wait_breakdown::WaitBreakdown,
 };
 use faceoff_sandbox::{
-    AgentProcess, AnswerState, Baseline, Layer, ReadLine, Runtime, SpawnError, SpawnSpec,
+    AgentProcess, AnswerState, CounterBaseline, Layer, ReadLine, Runtime, SpawnError, SpawnSpec,
     WriteError, affinity,
 };
 use faceoff_types::{AgentFaultKind, Phase, TimeLimits};
@@ -40,7 +40,7 @@ pub(crate) struct Exchange<'w> {
     /// Did the last answer take less than [`SPIN_TIME`]?
     was_quick: bool,
     /// The counters before a recent question.
-    baseline: Option<Arc<Baseline>>,
+    baseline: Option<Arc<CounterBaseline>>,
     /// The message being sent; its memory is reused.
     line: Vec<u8>,
     /// CPU time of the agent at its questions and answers.
@@ -203,7 +203,7 @@ impl<'w> Exchange<'w> {
 
     /// The counters before a question, at most [`BASELINE_MAX_AGE`] old: reading them for each question to a quick
     /// agent would cost more than the answer. They are kernel files, so no agent can block the read.
-    fn read_baseline(&mut self, phase: Phase) -> Arc<Baseline> {
+    fn read_baseline(&mut self, phase: Phase) -> Arc<CounterBaseline> {
         if phase != Phase::Step {
             self.process.track_threads();
             self.baseline = None;

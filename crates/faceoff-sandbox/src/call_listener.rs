@@ -8,7 +8,7 @@ use std::{
     os::fd::{AsFd, AsRawFd, FromRawFd, OwnedFd},
 };
 
-/// Installs a filter in the calling process and returns its listener. With `WAIT_KILLABLE_RECV` (Linux 5.19) a call that this service has
+/// Installs a filter in the calling process and returns its listener. With `WAIT_KILLABLE_RECV` (Linux 5.19) a call that the answering process has
 /// received is not repeated because of a signal.
 pub(crate) fn install_with_listener(program: &BpfProgram) -> Result<OwnedFd, Errno> {
     const NEW_LISTENER: libc::c_ulong = 1 << 3;

@@ -11,7 +11,7 @@ use std::{fs, io};
 const MAX_DESCRIPTORS: usize = 4096;
 
 /// Does a process of `tree` other than `helpers` (bubblewrap's) have a descriptor that `/proc` names `output`? Also `true` if this is unknown;
-/// then the service waits until the deadline of the answer.
+/// then the evaluator waits until the deadline of the answer.
 pub(crate) fn is_open_in_tree(
     output: &str,
     tree: &[Pid],
