@@ -5,8 +5,8 @@ use faceoff_service::csv::{Table, escape_formula, or_empty};
 use faceoff_types::{Competition, TaskMap};
 use std::fmt::Display;
 
-/// The columns of each task about its score; a table prefixes them with the task's name. In a competition without tiers, tables have no columns
-/// of them.
+/// The columns of each task about its score; a table prefixes them with the task's name. In a competition without tiers, tables have no
+/// columns of them.
 pub(crate) fn score_columns(competition: &Competition) -> Vec<&'static str> {
     let mut columns = vec![
         "episodes",
@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn tables_without_tiers_lack_only_their_columns() {
+    fn tables_without_tiers_lack_only_the_tier_columns() {
         let competition = faceoff_airhockey::competition();
         let without = Competition {
             tiers: None,

@@ -19,8 +19,8 @@ use std::path::Path;
 pub trait Observer {
     /// An episode is over.
     fn on_episode_end(&mut self, outcome: &EpisodeOutcome);
-    /// The agent's standard error (its beginning and end, if it is long), with its faults. Called exactly once, even if there is no report because
-    /// the shard was cancelled or the platform failed.
+    /// The agent's standard error (its beginning and end, if it is long), with its faults. Called exactly once, even if there is no
+    /// report because the shard was cancelled or the platform failed.
     fn log(&mut self, _log: &str) {}
     /// The agent runs, since it has answered `hello`. Called before each reset and each step, so it must be cheap.
     fn on_agent_running(&self) {}

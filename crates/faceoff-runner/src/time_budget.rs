@@ -1,5 +1,5 @@
-//! Time budgets over many answers, in addition to the limit of each answer (`docs/rules.md`, "Real time is the rule"). With only a limit per answer, an agent could occupy a
-//! worker's slot for days.
+//! Time budgets over many answers, in addition to the limit of each answer (`docs/rules.md`, "Real time is the rule"). With only a limit
+//! per answer, an agent could occupy a worker's slot for days.
 
 use faceoff_types::{AgentFaultKind, Phase, TimeLimits};
 

@@ -217,8 +217,8 @@ struct EmulatedValues {
     has_namespaces: bool,
 }
 
-/// The answer of `statfs` and `fstatfs`: an empty file system of so many blocks. On 64-bit machines the fields of the kernel's structure are
-/// 64-bit integers in this order; the last four are unused.
+/// The answer of `statfs` and `fstatfs`: an empty file system of so many blocks. On 64-bit machines the fields of the kernel's structure
+/// are 64-bit integers in this order; the last four are unused.
 const fn statfs_fields(blocks: u64) -> [u64; 15] {
     let (size, free, available) = (blocks, blocks, blocks);
     let (files, free_files) = (FREE_FILES, FREE_FILES);
@@ -242,8 +242,8 @@ const fn statfs_fields(blocks: u64) -> [u64; 15] {
     ]
 }
 
-/// The answer of `sysinfo`: the host's figures before the first agent started, and the agent's memory. On 64-bit machines that put the lower
-/// byte first, the fields of the kernel's structure and their padding are these integers.
+/// The answer of `sysinfo`: the host's figures before the first agent started, and the agent's memory. On 64-bit machines that put the
+/// lower byte first, the fields of the kernel's structure and their padding are these integers.
 fn sysinfo_fields(memory: MemoryView) -> [u64; 14] {
     static HOST: OnceLock<Sysinfo> = OnceLock::new();
     let host = HOST.get_or_init(sysinfo);

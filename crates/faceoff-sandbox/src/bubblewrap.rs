@@ -73,8 +73,8 @@ const INIT: &str = "/proc/1";
 /// Terminals, whose number all agents share.
 const TERMINALS: &str = "/dev/pts";
 
-/// Counters of the host that ordinary libraries read. Agents see snapshots that were taken before the first agent started, because
-/// the live counters would show what other agents do (e.g. the number of started processes). The snapshots show the agent's CPUs and memory.
+/// Counters of the host that ordinary libraries read. Agents see snapshots that were taken before the first agent started, because the
+/// live counters would show what other agents do (e.g. the number of started processes). The snapshots show the agent's CPUs and memory.
 const SNAPSHOT_NAMES: [&str; 5] = ["stat", "cpuinfo", "meminfo", "loadavg", "uptime"];
 
 /// An installed bubblewrap and its features.

@@ -24,7 +24,8 @@ use std::{
 /// Maximum lag of the counters behind the true run time: the kernel charges a running thread at its next tick, at least 100 times a second.
 const MAX_COUNTER_LAG: Duration = Duration::from_millis(10);
 
-/// Counters read right before a question, with which later readings are compared (a message to the agent that expects an answer). Reading them takes a few microseconds.
+/// Counters read right before a question (a message to the agent that expects an answer). Later readings are compared with them.
+/// Reading them takes a few microseconds.
 #[derive(Debug, Clone)]
 pub struct CounterBaseline {
     /// When the counters were read.

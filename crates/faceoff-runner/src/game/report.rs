@@ -30,8 +30,8 @@ pub trait GameObserver {
     fn on_step(&mut self, _row: &GameStepRow<'_>) {}
     /// A rally is over.
     fn on_rally_end(&mut self, _row: &RallyRow<'_>) {}
-    /// An agent's standard error (its beginning and end, if it is long), with its faults. Called exactly once for each side, even if there is no
-    /// report because the game was cancelled or the platform failed.
+    /// An agent's standard error (its beginning and end, if it is long), with its faults. Called exactly once for each side, even if
+    /// there is no report because the game was cancelled or the platform failed.
     fn log(&mut self, _side: Side, _log: &str) {}
     /// Should the game stop? Called after each start and before each step, so it must be cheap.
     fn cancelled(&self) -> bool;
