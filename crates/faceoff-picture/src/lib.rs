@@ -6,7 +6,7 @@
 mod animation;
 mod canvas;
 mod font;
-mod hypotenuse;
+mod hypotf;
 mod pixels;
 pub mod text;
 

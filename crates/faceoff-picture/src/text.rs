@@ -2,20 +2,20 @@
 
 use crate::font::{Placement, Weight};
 
-/// What stands for the truncated rest of a text.
+/// Replaces the rest of a truncated text.
 const ELLIPSIS: char = '…';
 
 /// How a text looks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TextStyle {
     pub weight: Weight,
-    /// Size of an em.
+    /// The font size: the length of an em, the unit of a font.
     pub size_px: f64,
-    /// As in SVG.
+    /// The value of the attribute `fill` in SVG, e.g. `#102030`.
     pub colour: &'static str,
 }
 
-/// Which part of a text is at its position.
+/// Which part of a text is at the x of its position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Align {
     Left,
@@ -35,7 +35,8 @@ impl TextStyle {
 
     #[must_use]
     pub fn width_px(&self, text: &str) -> f64 {
-        let advances = drawn(text).map(|c| self.weight.advance_em(self.weight.shape(c)));
+        let advances =
+            characters_with_width(text).map(|c| self.weight.advance_em(self.weight.shape(c)));
         self.size_px * advances.sum::<f64>()
     }
 
@@ -90,7 +91,7 @@ impl TextStyle {
         };
         let mut path = String::new();
         let mut pen = left;
-        for character in drawn(text) {
+        for character in characters_with_width(text) {
             let shape = self.weight.shape(character);
             let placement = Placement {
                 x: pen,
@@ -112,7 +113,7 @@ pub fn is_legible(text: &str) -> bool {
 }
 
 /// The characters that take space: controls and joiners take none.
-fn drawn(text: &str) -> impl Iterator<Item = char> {
+fn characters_with_width(text: &str) -> impl Iterator<Item = char> {
     text.chars().filter(|c| {
         !c.is_control()
             && !matches!(c, '\u{200b}'..='\u{200f}' | '\u{2060}' | '\u{fe00}'..='\u{fe0f}')
@@ -181,11 +182,14 @@ mod tests {
     #[test]
     fn long_text_is_truncated_to_its_width() {
         let text = "Grundgesetz Hockey";
-        let full = REGULAR.width_px(text);
-        assert_eq!(REGULAR.truncated(text, full), text);
-        assert_eq!(REGULAR.truncated(text, full - 1.0), "Grundgesetz Hock…");
-        let short = REGULAR.width_px("Grundgesetz …");
-        assert_eq!(REGULAR.truncated(text, short), "Grundgesetz…");
+        let full_width = REGULAR.width_px(text);
+        assert_eq!(REGULAR.truncated(text, full_width), text);
+        assert_eq!(
+            REGULAR.truncated(text, full_width - 1.0),
+            "Grundgesetz Hock…"
+        );
+        let width_of_first_word = REGULAR.width_px("Grundgesetz …");
+        assert_eq!(REGULAR.truncated(text, width_of_first_word), "Grundgesetz…");
         assert_eq!(REGULAR.truncated(text, 1.0), "");
     }
 
@@ -208,9 +212,10 @@ mod tests {
 
     #[test]
     fn character_without_a_glyph_is_a_box() {
-        let drawn = REGULAR.svg("冰", [0.0, 0.0], Align::Left);
-        assert_eq!(drawn.matches('M').count(), 2, "{drawn}");
-        assert_eq!(drawn, REGULAR.svg("球", [0.0, 0.0], Align::Left));
+        let element = REGULAR.svg("冰", [0.0, 0.0], Align::Left);
+        // A box has two outlines, an outer and an inner one, each of which begins with `M`.
+        assert_eq!(element.matches('M').count(), 2, "{element}");
+        assert_eq!(element, REGULAR.svg("球", [0.0, 0.0], Align::Left));
         assert!(REGULAR.width_px("冰") > 0.0);
         assert!(!is_legible("冰球"));
         assert!(!is_legible(" "));
@@ -220,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn covered_scripts_have_no_box() {
+    fn latin_greek_and_cyrillic_have_no_box() {
         for text in [
             "Ñandú Šťastný Çelik",
             "Αθήνα",
@@ -228,8 +233,9 @@ mod tests {
             "1 – 2 ≤ 3 … “x” €",
         ] {
             for weight in [Weight::Regular, Weight::Semibold] {
-                let lacking: Vec<char> = text.chars().filter(|c| !weight.covers(*c)).collect();
-                assert!(lacking.is_empty(), "{lacking:?}");
+                let without_glyph: Vec<char> =
+                    text.chars().filter(|c| !weight.covers(*c)).collect();
+                assert!(without_glyph.is_empty(), "{without_glyph:?}");
             }
         }
     }

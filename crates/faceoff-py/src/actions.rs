@@ -28,19 +28,17 @@ pub enum ActionMode {
     Raw,
 }
 
-/// Format of the actions of a Gymnasium environment, from which the action for the evaluator is made. The interpolation decides
-/// the layout of both.
+/// Format of the actions of a Gymnasium environment, which [`ActionFormat::command`] converts to those of an agent. The interpolation (the
+/// rule by which an action becomes a trajectory of 20 ms) decides the layout of both.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ActionFormat {
-    /// Meaning of their numbers.
     pub mode: ActionMode,
-    /// Conversion to trajectories.
     pub interpolation: Interpolation,
     /// Clip numbers to their bounds.
     pub clip: bool,
 }
 
-/// Quantity in a row of an action.
+/// Meaning of a row of an action: seven numbers, one for each joint.
 #[derive(Clone, Copy)]
 enum Quantity {
     /// Position after this fraction of the control step.
@@ -140,17 +138,17 @@ fn scale(quantity: Quantity, joint: usize, fraction: f64, previous: Option<f64>)
     let velocity = LINKS[joint].velocity_limit_rad_s;
     match (quantity, previous) {
         (Quantity::Position(part), Some(previous)) => {
-            let reach = LIMIT_FRACTION * velocity * CONTROL_STEP_S * part;
-            (previous + fraction * reach).clamp(-range, range)
+            let max_change = LIMIT_FRACTION * velocity * CONTROL_STEP_S * part;
+            (previous + fraction * max_change).clamp(-range, range)
         }
         (Quantity::Position(_), None) => {
-            let centre = INITIAL_Q[joint];
-            let reach = if fraction < 0.0 {
-                range + centre
+            let start = INITIAL_Q[joint];
+            let distance_to_bound = if fraction < 0.0 {
+                range + start
             } else {
-                range - centre
+                range - start
             };
-            centre + fraction * reach
+            start + fraction * distance_to_bound
         }
         (Quantity::Velocity, _) => fraction * LIMIT_FRACTION * velocity,
         (Quantity::Acceleration, _) => fraction * ACCELERATION_PER_VELOCITY * velocity,

@@ -1,4 +1,5 @@
-//! The simulator's batch, which steps many worlds together without Python: benchmarks compare the environments with it.
+//! The simulator's batch, which steps many worlds together without the environments of this package. Benchmarks measure by it how much
+//! time the environments add.
 
 use crate::errors::{argument_error, catch_panic, simulator_error};
 use faceoff_sim::{
@@ -25,7 +26,7 @@ impl Batch {
         let task = task
             .parse()
             .map_err(|_| argument_error("task", "hit, defend or prepare", task))?;
-        let hold = Interpolation::Cubic.hold_position(&INITIAL_Q);
+        let hold_action = Interpolation::Cubic.hold_position(&INITIAL_Q);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         catch_panic(|| {
             Ok(Self {
@@ -38,7 +39,8 @@ impl Batch {
                     seed: Seed::from_number(0),
                     worlds,
                 }),
-                actions: hold[..2 * JOINTS].repeat(worlds as usize),
+                // An action of the cubic interpolation: positions and velocities.
+                actions: hold_action[..2 * JOINTS].repeat(worlds as usize),
                 pool: pool.map_err(|error| simulator_error(&error.to_string()))?,
             })
         })

@@ -82,7 +82,7 @@ where
     })
 }
 
-/// Refuses a pickled state of another version of this package, which would play it differently.
+/// Refuses a pickled state of another version of this package, whose simulator may compute other states.
 ///
 /// # Errors
 /// If `version` is not this one.

@@ -51,15 +51,15 @@ impl Evaluation {
         let profile: AirHockeyProfile = profile
             .parse()
             .map_err(|error| argument_error("profile", "a profile", error))?;
-        let read = |name, text: &str| -> PyResult<Seed> {
+        let parse_seed = |name, text: &str| -> PyResult<Seed> {
             text.parse()
                 .map_err(|error: faceoff_types::ParseSeedError| {
                     argument_error(name, "a seed", error)
                 })
         };
-        let seed = read("seed", seed)?;
+        let seed = parse_seed("seed", seed)?;
         let mismatch_seed = match mismatch_seed {
-            Some(text) => read("mismatch_seed", text)?,
+            Some(text) => parse_seed("mismatch_seed", text)?,
             None => seed.model_mismatch(),
         };
         let settings: PerturbationSettings = serde_json::from_str(perturbations)
@@ -143,7 +143,7 @@ impl Evaluation {
             by_task.entry(task).or_default().push(outcome);
         }
         let competition = competition();
-        let bounds = competition.tier_bounds(&self.variation);
+        let tier_bounds = competition.tier_bounds(&self.variation);
         let result = catch_panic(|| {
             let tasks: TaskMap<TaskResult> = by_task
                 .into_iter()
@@ -153,8 +153,12 @@ impl Evaluation {
                     let steps = outcomes.iter().map(|outcome| u64::from(outcome.steps));
                     let steps: u64 = steps.sum();
                     let mut times = StepTimes::for_steps(steps);
+                    // The policy was not timed, so each step counts as 0 s.
                     (0..steps).for_each(|_| times.add(0.0));
-                    (task, score_task(&competition, &outcomes, &times, bounds))
+                    (
+                        task,
+                        score_task(&competition, &outcomes, &times, tier_bounds),
+                    )
                 })
                 .collect();
             let ruleset = faceoff_airhockey::RULESET;
@@ -164,7 +168,7 @@ impl Evaluation {
                 self.seed,
                 &self.variation,
                 &competition.weights(&self.variation),
-                bounds,
+                tier_bounds,
                 tasks,
             ))
         })?;
@@ -179,6 +183,7 @@ pub struct PolicyEpisode {
     action_format: ActionFormat,
     /// Last commanded joint positions, rad.
     commanded: [f64; JOINTS],
+    /// The command of the current step; its memory is reused.
     command: Vec<f64>,
     is_over: bool,
 }
@@ -194,7 +199,7 @@ impl PolicyEpisode {
         Ok(PyArray1::from_slice(py, request.observation))
     }
 
-    /// Runs a control step. Returns the outcome as JSON at the episode's end.
+    /// Runs a control step with the policy's action. Returns the outcome as JSON at the episode's end.
     fn answer(
         &mut self,
         py: Python<'_>,

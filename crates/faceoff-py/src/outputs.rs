@@ -145,10 +145,10 @@ pub struct OwnedOutputs {
 }
 
 impl OwnedOutputs {
-    /// Zeroed rows for `worlds` worlds; true states only if requested.
-    pub fn new(setup: &Setup, worlds: usize, states: bool) -> Self {
+    /// Zeroed rows for `worlds` worlds; `with_states`: also for true states.
+    pub fn new(setup: &Setup, worlds: usize, with_states: bool) -> Self {
         let observation_len = setup.observation_len();
-        let states = if states { worlds * STATE_LEN } else { 0 };
+        let states_len = if with_states { worlds * STATE_LEN } else { 0 };
         Self {
             observation_len,
             observations: vec![0.0; worlds * observation_len],
@@ -157,8 +157,8 @@ impl OwnedOutputs {
             terminated: vec![false; worlds],
             truncated: vec![false; worlds],
             facts: vec![0.0; worlds * FACTS],
-            states: vec![0.0; states],
-            next_states: vec![0.0; states],
+            states: vec![0.0; states_len],
+            next_states: vec![0.0; states_len],
         }
     }
 

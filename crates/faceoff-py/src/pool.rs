@@ -12,6 +12,7 @@ use std::{mem, process};
 #[derive(Debug)]
 pub struct Pool {
     threads: usize,
+    /// The started pool, and the id of the process that started it.
     pool: Option<(u32, ThreadPool)>,
 }
 

@@ -6,12 +6,13 @@ use faceoff_sim::{Episode, ViolatedConstraints, table::geometry::TABLE};
 
 /// Reward of a success at the episode's end.
 pub const SUCCESS: f64 = 10.0;
-/// Decrease of the potential per metre between mallet and puck.
+/// Decrease of the potential per metre between mallet and puck, up to one metre.
 const PER_METRE_TO_PUCK: f64 = 0.5;
-/// Decrease of the potential per m/s of the puck's speed in `defend`.
+/// Decrease of the potential per m/s of the puck's speed in `defend`, up to 5 m/s.
 const PER_METRE_PER_SECOND: f64 = 1.0;
 
-/// Potential of a state, in points; the reward of a step contains its change (potential-based shaping).
+/// Potential of a state, in points; the reward of a step contains its change (potential-based shaping). It is higher the closer the
+/// state is to success: the puck near the opponent's end (hit), slow (defend), or near the table's long axis (prepare).
 pub fn potential(task: AirHockeyTask, episode: &Episode) -> f64 {
     let world = episode.world();
     let puck = world.puck();

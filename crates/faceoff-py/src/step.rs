@@ -49,6 +49,7 @@ pub fn step(
     let mut commands = vec![0.0; worlds.len() * len];
     let mut is_stepped = vec![true; worlds.len()];
     for (row, world) in worlds.iter_mut().enumerate() {
+        // Only with [`Autoreset::NextStep`]: the other modes leave no ended episode when a step begins.
         if world.end.is_some() {
             world.start_next(setup);
             outputs.write_start(row, world);

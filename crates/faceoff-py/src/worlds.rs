@@ -5,7 +5,7 @@ use crate::{
         OrderError, argument_error, borrow_mut, catch_panic, closed_error, missing_reset_error,
         panic_message, simulator_error,
     },
-    output_arrays::OutputArrays,
+    numpy_outputs::NumpyOutputs,
     outputs::{OwnedOutputs, chunks_with_worlds},
     pool::{Pool, pool_if_parallel},
     setup::Setup,
@@ -35,6 +35,7 @@ const CHUNKS_PER_THREAD: usize = 4;
 pub struct Worlds {
     setup: Arc<Setup>,
     autoreset: Autoreset,
+    /// Number of worlds.
     count: usize,
     pool: Pool,
     state: State,
@@ -77,7 +78,7 @@ impl Worlds {
         })
     }
 
-    /// Resets the worlds of the mask to episode `number` of their seed, or without a seed to the episode after the last
+    /// Resets the worlds for which `mask` is true to episode `number` of their seed, or without a seed to the episode after the last
     /// one. Rows of other worlds are not written.
     fn reset(
         slf: &Bound<'_, Self>,
@@ -86,7 +87,7 @@ impl Worlds {
         seeds: Vec<Option<u64>>,
         number: Option<u32>,
         puck: Option<[f64; 6]>,
-        mut rows: OutputArrays<'_>,
+        mut rows: NumpyOutputs<'_>,
     ) -> PyResult<()> {
         let this = &mut *borrow_mut(slf)?;
         let setup = &*this.setup;
@@ -150,7 +151,7 @@ impl Worlds {
         slf: &Bound<'_, Self>,
         py: Python<'_>,
         actions: PyReadonlyArray2<'_, f64>,
-        mut rows: OutputArrays<'_>,
+        mut rows: NumpyOutputs<'_>,
     ) -> PyResult<()> {
         let this = &mut *borrow_mut(slf)?;
         let mut outputs = rows.outputs(this.count, this.setup.observation_len())?;
@@ -220,7 +221,7 @@ impl Worlds {
     }
 
     /// Waits for the step that was sent.
-    fn recv(slf: &Bound<'_, Self>, py: Python<'_>, mut rows: OutputArrays<'_>) -> PyResult<()> {
+    fn recv(slf: &Bound<'_, Self>, py: Python<'_>, mut rows: NumpyOutputs<'_>) -> PyResult<()> {
         let this = &mut *borrow_mut(slf)?;
         let mut outputs = rows.outputs(this.count, this.setup.observation_len())?;
         let (worlds, owned) = this.state.receive(py)?;
@@ -242,7 +243,7 @@ impl Worlds {
         slf: &Bound<'_, Self>,
         index: usize,
         snapshot: &Bound<'_, Snapshot>,
-        mut rows: OutputArrays<'_>,
+        mut rows: NumpyOutputs<'_>,
     ) -> PyResult<()> {
         let this = &mut *borrow_mut(slf)?;
         let snapshot = snapshot.get();

@@ -1,7 +1,7 @@
 //! Collects what one side (the agent of an episode, or one of a game's two) saw and did: the columns of its observations,
 //! commands and computation times, one value per sample (the state after a control step).
 
-use crate::{column::Column, header::TrackingGap, motion::joints};
+use crate::{column::Column, header::TrackingGap, motion::joint_columns};
 use faceoff_episode::AnswerTiming;
 use faceoff_sim::{Interpolation, JOINTS, model::CONTROL_STEP_S, table::geometry::TABLE};
 use std::f64::consts::PI;
@@ -18,16 +18,16 @@ const COMMAND_COLUMN: usize = 3;
 const COMPUTATION_TIME_COLUMN: usize = COMMAND_COLUMN + JOINTS;
 const HOST_TIME_COLUMN: usize = COMPUTATION_TIME_COLUMN + 1;
 
-/// The samples of one side.
+/// The samples of one side; columns of observations start with sample 0 (before the first step), those of answers with sample 1.
 #[derive(Debug)]
 pub(crate) struct AgentView {
     /// 0 or 1.
     side: u32,
     columns: Vec<Column>,
     /// Samples whose answer took longer than a control step.
-    late: Vec<u32>,
+    late_samples: Vec<u32>,
     /// Spans in which the simulated tracking had lost the puck.
-    gaps: Vec<TrackingGap>,
+    tracking_gaps: Vec<TrackingGap>,
 }
 
 impl AgentView {
@@ -39,7 +39,7 @@ impl AgentView {
             Column::new("seen_yaw", "rad", ANGLE_RESOLUTION_RAD, 1),
         ];
         columns.extend(
-            joints("command", "rad", COMMAND_RESOLUTION_RAD, 2)
+            joint_columns("command", "rad", COMMAND_RESOLUTION_RAD, 2)
                 .map(|column| column.beginning_at(1)),
         );
         columns.extend(
@@ -49,8 +49,8 @@ impl AgentView {
         Self {
             side,
             columns,
-            late: Vec::new(),
-            gaps: Vec::new(),
+            late_samples: Vec::new(),
+            tracking_gaps: Vec::new(),
         }
     }
 
@@ -91,12 +91,12 @@ impl AgentView {
         self.columns[COMPUTATION_TIME_COLUMN].push(timing.computation_time_s);
         self.columns[HOST_TIME_COLUMN].push(timing.host_time_s);
         if timing.computation_time_s > CONTROL_STEP_S {
-            self.late.push(sample);
+            self.late_samples.push(sample);
         }
         if puck_lost {
-            match self.gaps.last_mut() {
+            match self.tracking_gaps.last_mut() {
                 Some(gap) if gap.to + 1 == sample => gap.to = sample,
-                _ => self.gaps.push(TrackingGap {
+                _ => self.tracking_gaps.push(TrackingGap {
                     from: sample,
                     to: sample,
                 }),
@@ -114,7 +114,7 @@ impl AgentView {
         {
             self.columns.truncate(HOST_TIME_COLUMN);
         }
-        (self.columns, self.late, self.gaps)
+        (self.columns, self.late_samples, self.tracking_gaps)
     }
 }
 

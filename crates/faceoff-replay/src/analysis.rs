@@ -9,7 +9,7 @@ use crate::{
 };
 use std::collections::VecDeque;
 
-/// The analysis of a game. Sides are 0 and 1; positions are in the table frame, in metres.
+/// The analysis of a game. Side 0 defends the half x < 0, side 1 the other; positions are in the table frame, in metres.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct GameAnalysis {
     /// Number of analysed control steps.
@@ -91,6 +91,7 @@ pub struct LocatedViolation {
 struct Touch {
     /// The shot that the touch becomes if the puck crosses the middle line.
     shot: Shot,
+    /// Has the puck crossed the middle line since the touch?
     has_crossed: bool,
 }
 

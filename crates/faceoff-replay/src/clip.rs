@@ -28,7 +28,8 @@ impl Clip {
         self.columns.iter().find(|column| column.name == name)
     }
 
-    /// The gzip-compressed bytes of the clip, as stored in packs and sent by servers. The same clip gives the same bytes.
+    /// The gzip-compressed bytes of the clip, as stored in packs and sent by servers: the length of the header (4 bytes), the header,
+    /// and the columns' numbers (the *payload*). The same clip gives the same bytes.
     ///
     /// # Errors
     /// [`ReplayError::Io`] if writing to memory fails; [`ReplayError::Unreadable`] if the clip is too long.

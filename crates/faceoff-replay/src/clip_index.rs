@@ -12,7 +12,7 @@ use std::{
 
 /// Name and version of the index's layout.
 const INDEX_FORMAT: &str = "faceoff-sheet/1";
-/// What everybody may read of an episode that a fault of the agent ended.
+/// The public description of the end of an episode that a fault of the agent ended; the details are the team's.
 const AGENT_FAULT_TEXT: &str = "a fault of the agent ended the episode";
 /// Maximum uncompressed size of an index.
 const MAX_BYTES: u64 = 256 << 20;
@@ -59,7 +59,7 @@ pub struct EpisodeIndexEntry {
     #[serde(default, rename = "start", skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "openapi", schema(nullable = false))]
     pub puck_at_start: Option<[f64; 4]>,
-    /// True position and velocity of the puck at the end, as in `start`.
+    /// True position and velocity of the puck at the end: x, y (m), vx, vy (m/s), table frame.
     #[serde(default, rename = "last", skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "openapi", schema(nullable = false))]
     pub puck_at_end: Option<[f64; 4]>,

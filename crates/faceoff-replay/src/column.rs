@@ -13,7 +13,7 @@ pub struct Column {
     pub scale: f64,
     /// Order of the differences that are written: 0 (the counts themselves), 1 or 2 (differences of the differences).
     pub order: u8,
-    /// Index of the column's first sample within the clip.
+    /// The sample of the first value, from 0 at the clip's start: 1 in columns of answers, which the initial state has not.
     pub first: u32,
     /// The values, in units of `scale`.
     pub counts: Vec<i64>,
@@ -38,7 +38,7 @@ impl Column {
         }
     }
 
-    /// Sets the index of the column's first sample within the clip.
+    /// Sets the sample of the first value, from 0 at the clip's start.
     pub(crate) fn beginning_at(self, first: u32) -> Self {
         Self { first, ..self }
     }

@@ -22,9 +22,9 @@ use faceoff_types::{EpisodeOutcome, Task, escape_unprintable};
 pub(crate) struct Recording {
     episode: u32,
     /// The puck's true state before the first step: x, y, yaw and their velocities.
-    start: [f64; 6],
-    /// The puck's true state after the last step.
-    last: [f64; 6],
+    puck_at_start: [f64; 6],
+    /// The puck's true state after the last step so far.
+    puck: [f64; 6],
     motion: Motion,
     agent_view: AgentView,
     tracker: ViolationTracker,
@@ -49,8 +49,8 @@ impl Recording {
         motion.push(state);
         Some(Self {
             episode: start.episode,
-            start: state.puck,
-            last: state.puck,
+            puck_at_start: state.puck,
+            puck: state.puck,
             motion,
             agent_view: AgentView::new(0),
             tracker: ViolationTracker::default(),
@@ -85,7 +85,7 @@ impl Recording {
             }
         }
         self.times_s.push(row.timing.computation_time_s);
-        self.last = state.puck;
+        self.puck = state.puck;
     }
 
     fn add_violation(
@@ -130,11 +130,11 @@ impl Recording {
     /// The clips and the summary for the index. Adds the computation times to `times`.
     pub fn end(mut self, outcome: &EpisodeOutcome, times: &mut TimeBins) -> EpisodeClips {
         let fault = outcome.fault.as_ref().map(|fault| &fault.fault);
-        let description = describe_end(outcome.task, outcome.end, &self.last, outcome.steps, fault);
+        let description = describe_end(outcome.task, outcome.end, &self.puck, outcome.steps, fault);
         let description = escape_unprintable(&description).into_owned();
         // Details of a fault are not public.
         let public_description = match outcome.fault {
-            Some(_) => describe_end(outcome.task, outcome.end, &self.last, outcome.steps, None),
+            Some(_) => describe_end(outcome.task, outcome.end, &self.puck, outcome.steps, None),
             None => description.clone(),
         };
         let end = |description| EpisodeEndSummary {
@@ -152,8 +152,8 @@ impl Recording {
             success: outcome.success,
             end: outcome.end,
             end_description: description.clone(),
-            puck_at_start: Some(position_and_velocity(&self.start)),
-            puck_at_end: Some(position_and_velocity(&self.last)),
+            puck_at_start: Some(position_and_velocity(&self.puck_at_start)),
+            puck_at_end: Some(position_and_velocity(&self.puck)),
             violations: self.violations,
             longest_s: Some(self.times_s.iter().copied().fold(0.0, f64::max)),
             late_answers: u32::try_from(late.len()).unwrap_or(u32::MAX),
@@ -206,7 +206,7 @@ impl EpisodeClips {
     }
 }
 
-/// The world of air hockey behind the trait.
+/// The world of air hockey behind the trait; `None` for another world.
 fn world(world: &dyn World) -> Option<&AirHockeyWorld> {
     world.as_any().downcast_ref()
 }

@@ -32,12 +32,14 @@ pub struct GameClipRecorder<W> {
 struct Chunk {
     number: u32,
     motion: Motion,
-    sides: [AgentView; 2],
+    views: [AgentView; 2],
     trackers: [ViolationTracker; 2],
     rally_ends: Vec<RallyEndEvent>,
-    /// The score at the first sample, and the current score.
-    score: [[u32; 2]; 2],
-    /// The last sample so far.
+    /// The score at the first sample.
+    initial_score: [u32; 2],
+    /// The current score.
+    score: [u32; 2],
+    /// The last sample so far, and its state.
     last: u32,
     state: GameState,
 }
@@ -58,10 +60,11 @@ impl Chunk {
         Self {
             number,
             motion,
-            sides: [AgentView::new(0), AgentView::new(1)],
+            views: [AgentView::new(0), AgentView::new(1)],
             trackers: Default::default(),
             rally_ends: Vec::new(),
-            score: [score; 2],
+            initial_score: score,
+            score,
             last: number * CHUNK_STEPS,
             state: *state,
         }
@@ -74,7 +77,7 @@ impl Chunk {
         for (side, side_step) in (0_u32..).zip(&row.sides) {
             let index = usize::from(side == 1);
             self.trackers[index].update(side, sample, &side_step.constraints);
-            let view = &mut self.sides[index];
+            let view = &mut self.views[index];
             match (side_step.action, side_step.timing) {
                 (Some(action), Some(timing)) => {
                     view.answer(sample, action, &timing, row.puck_lost);
@@ -103,7 +106,7 @@ impl Chunk {
     fn end(mut self) -> (u32, [Clip; 3]) {
         let first = self.number * CHUNK_STEPS;
         let header = Header::new("game", first, self.last - first + 1);
-        let [home, away] = self.sides;
+        let [home, away] = self.views;
         let view_clip = |side: u32, view: AgentView| {
             let (columns, late, tracking_gaps) = view.take();
             Clip {
@@ -117,7 +120,7 @@ impl Chunk {
                 columns,
             }
         };
-        let sides = [view_clip(0, home), view_clip(1, away)];
+        let view_clips = [view_clip(0, home), view_clip(1, away)];
         let (columns, contacts) = self.motion.take();
         let mut violations: Vec<_> = self
             .trackers
@@ -130,12 +133,12 @@ impl Chunk {
                 contacts,
                 violations,
                 rally_ends: self.rally_ends,
-                score: Some(self.score[0]),
+                score: Some(self.initial_score),
                 ..header
             },
             columns,
         };
-        let [home, away] = sides;
+        let [home, away] = view_clips;
         (self.number, [motion, home, away])
     }
 }
@@ -193,7 +196,7 @@ impl<W: Write> GameSink for GameClipRecorder<W> {
 
     fn observe(&mut self, observations: [&[f64]; 2]) {
         if let Some(chunk) = &mut self.chunk {
-            for (view, observation) in chunk.sides.iter_mut().zip(observations) {
+            for (view, observation) in chunk.views.iter_mut().zip(observations) {
                 view.observe(observation);
             }
         }
@@ -205,7 +208,7 @@ impl<W: Write> GameSink for GameClipRecorder<W> {
         };
         chunk.step(row);
         if chunk.is_full() {
-            let (next, state, [_, score]) = (chunk.number + 1, chunk.state, chunk.score);
+            let (next, state, score) = (chunk.number + 1, chunk.state, chunk.score);
             self.end_chunk().map_err(record_error)?;
             self.chunk = Some(Chunk::begin(next, &state, score));
         }
@@ -214,7 +217,7 @@ impl<W: Write> GameSink for GameClipRecorder<W> {
 
     fn end_rally(&mut self, row: &RallyRow<'_>) -> Result<(), RecordError> {
         if let Some(chunk) = &mut self.chunk {
-            chunk.score[1] = row.score;
+            chunk.score = row.score;
             chunk.rally_ends.push(RallyEndEvent {
                 sample: chunk.last,
                 kind: rally_end_kind(row.ending),

@@ -1,4 +1,5 @@
-//! Compresses gzip members with a reused compressor, since creating one takes longer than compressing a clip.
+//! Compresses gzip members (each a complete gzip stream, here one clip) with a reused compressor, since creating one takes longer than
+//! compressing a clip.
 
 use flate2::{Compression, Crc, write::DeflateEncoder};
 use std::io::{self, Write};

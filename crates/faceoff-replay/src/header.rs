@@ -97,7 +97,7 @@ pub struct ColumnHeader {
     pub scale: f64,
     /// Order of the differences.
     pub order: u8,
-    /// Index of the column's first sample within the clip.
+    /// The sample of the first value, from 0 at the clip's start.
     #[serde(default)]
     pub first: u32,
     pub count: u32,

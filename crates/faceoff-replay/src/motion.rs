@@ -29,7 +29,7 @@ pub(crate) struct Motion {
 }
 
 /// One column for each joint: `name_1` … `name_7`.
-pub(crate) fn joints(
+pub(crate) fn joint_columns(
     name: &str,
     unit: &str,
     scale: f64,
@@ -48,8 +48,13 @@ impl Motion {
             Column::new("puck_vx", "m/s", PUCK_SPEED_RESOLUTION_M_S, 1),
             Column::new("puck_vy", "m/s", PUCK_SPEED_RESOLUTION_M_S, 1),
         ];
-        columns.extend(joints("q", "rad", JOINT_ANGLE_RESOLUTION_RAD, 2));
-        columns.extend(joints("dq", "rad/s", JOINT_SPEED_RESOLUTION_RAD_S, 1));
+        columns.extend(joint_columns("q", "rad", JOINT_ANGLE_RESOLUTION_RAD, 2));
+        columns.extend(joint_columns(
+            "dq",
+            "rad/s",
+            JOINT_SPEED_RESOLUTION_RAD_S,
+            1,
+        ));
         columns.extend([1, 2].map(|axis| {
             Column::new(
                 format!("universal_{axis}"),
@@ -59,7 +64,12 @@ impl Motion {
             )
         }));
         if has_opponent {
-            columns.extend(joints("opponent_q", "rad", JOINT_ANGLE_RESOLUTION_RAD, 2));
+            columns.extend(joint_columns(
+                "opponent_q",
+                "rad",
+                JOINT_ANGLE_RESOLUTION_RAD,
+                2,
+            ));
         }
         Self {
             columns,
@@ -70,7 +80,7 @@ impl Motion {
     /// The columns of a game, in which both robots have the same columns.
     pub fn for_game() -> Self {
         let mut motion = Self::new(true);
-        motion.columns.extend(joints(
+        motion.columns.extend(joint_columns(
             "opponent_dq",
             "rad/s",
             JOINT_SPEED_RESOLUTION_RAD_S,
@@ -93,8 +103,8 @@ impl Motion {
         let [q, opponent_q] = state.q;
         let [dq, opponent_dq] = state.dq;
         let [universal, opponent_universal] = state.universal;
-        let own = [x, y, yaw, vx, vy].into_iter().chain(q).chain(dq);
-        let values = own
+        let puck_and_joints = [x, y, yaw, vx, vy].into_iter().chain(q).chain(dq);
+        let values = puck_and_joints
             .chain(universal)
             .chain(opponent_q)
             .chain(opponent_dq)
@@ -107,11 +117,11 @@ impl Motion {
     /// Adds a sample of an episode.
     pub fn push(&mut self, state: &EpisodeState) {
         let [x, y, yaw, vx, vy, _] = state.puck;
-        let own = [x, y, yaw, vx, vy]
+        let puck_and_joints = [x, y, yaw, vx, vy]
             .into_iter()
             .chain(state.q)
             .chain(state.dq);
-        let values = own
+        let values = puck_and_joints
             .chain(state.universal)
             .chain(state.opponent_q.into_iter().flatten());
         for (column, value) in self.columns.iter_mut().zip(values) {

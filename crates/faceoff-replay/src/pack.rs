@@ -3,14 +3,14 @@
 //! ```text
 //! 16 bytes   "faceoff-clips/1\n"
 //! clips, each gzip-compressed
-//! index, sorted by its first 8 bytes: 20 bytes a clip
+//! index of clips, sorted by kind, contest and number: 20 bytes a clip
 //!            kind u8 · contest u8 · 0 · 0 · number u32 · offset u64 · length u32 (all little-endian)
 //! 16 bytes   offset of the index u64 · clips u32 · "clip"
 //! ```
 //!
 //! | field   | values                                                                                     |
 //! |---------|--------------------------------------------------------------------------------------------|
-//! | kind    | 0 index of episodes, 1 motion, 2 observations of the (first) side, 3 of the second side     |
+//! | kind    | 0 index of episodes (their summaries), 1 motion, 2 observations of the (first) side, 3 of the second side     |
 //! | contest | 0 hit, 1 defend, 2 prepare, 3 game                                                         |
 //! | number  | the episode; in a game the chunk, which is a part of 500 control steps                     |
 

@@ -56,7 +56,7 @@ impl<W: Write> ClipRecorder<W> {
         })
     }
 
-    /// Writes the index of episodes and the index of clips.
+    /// Writes the index of episodes (their summaries), and the index of clips (their places in the file).
     ///
     /// # Errors
     /// [`ReplayError::Io`].

@@ -4,7 +4,7 @@ use crate::clip_index::{EpisodeIndexEntry, TimeBins, ViolationSummary};
 use faceoff_episode::StepRow;
 use faceoff_types::{Competition, EpisodeOutcome, escape_unprintable};
 
-/// An episode of which only the summary is recorded.
+/// An episode of which only the summary is recorded, so far.
 #[derive(Debug, Default)]
 pub(crate) struct SummaryRecording {
     violations: Vec<ViolationSummary>,

@@ -48,7 +48,7 @@ fn viewer_model_matches_the_simulator() {
             Offset::Y(y) => [0.0, y, 0.0],
             Offset::Z(z) => [0.0, 0.0, z],
         };
-        // Quaternion components of a quarter turn: sine and cosine of 45°.
+        // Quaternions (w, x, y, z), in which sine and cosine of 45° occur.
         let half = FRAC_1_SQRT_2;
         let orientation = match link.mount {
             Mount::Aligned => [1.0, 0.0, 0.0, 0.0],

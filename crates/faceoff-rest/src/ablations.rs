@@ -1,5 +1,5 @@
 //! Ablations: evaluations of a submission in the ideal simulator, with each perturbation (such as noise) alone, and with all
-//! of them. Each of these conditions is a *profile*. Organisers start ablations; they never count.
+//! of them. Each of these conditions is a *profile*. Organisers start ablations, whose results never count.
 
 use super::{
     clip_response::send,

@@ -75,7 +75,8 @@ pub(crate) async fn ask(
     Body(question): Body<NewQuestion>,
 ) -> Result<(StatusCode, Json<QuestionView>), Problem> {
     let asked = announcements::ask(&app, &caller, &question).await?;
-    let view = announcement::question(asked, true);
+    let shows_team = true;
+    let view = announcement::question(asked, shows_team);
     Ok((StatusCode::CREATED, Json(view)))
 }
 
@@ -92,5 +93,6 @@ pub(crate) async fn answer(
     Body(new_answer): Body<NewAnswer>,
 ) -> Result<Json<QuestionView>, Problem> {
     let answered = announcements::answer(&app, organiser.actor(), id, &new_answer).await?;
-    Ok(Json(announcement::question(answered, true)))
+    let shows_team = true;
+    Ok(Json(announcement::question(answered, shows_team)))
 }

@@ -5,7 +5,8 @@ use faceoff_service::csv::{Table, escape_formula, or_empty};
 use faceoff_types::{Competition, TaskMap};
 use std::fmt::Display;
 
-/// The columns of each task about its score; a table prefixes them with the task's name. Without tiers no table has their columns.
+/// The columns of each task about its score; a table prefixes them with the task's name. In a competition without tiers, tables have no
+/// columns of them.
 pub(crate) fn score_columns(competition: &Competition) -> Vec<&'static str> {
     let mut columns = vec![
         "episodes",
@@ -120,7 +121,7 @@ macro_rules! common_fields {
     }};
 }
 
-/// The ranked rows, then the baselines.
+/// The ranked rows, then the baselines, whose column `would_rank` has the rank that they would have.
 pub(crate) fn board_table(competition: &Competition, board: &BoardView) -> Table {
     let mut columns = vec!["rank", "rank_group", "baseline", "would_rank"];
     columns.extend(tier_fields(
@@ -148,25 +149,30 @@ pub(crate) fn board_table(competition: &Competition, board: &BoardView) -> Table
     let mut table = table_with_tasks(competition, &columns, &task_columns(competition));
     for row in &board.rows {
         let division = row.division.as_ref().map_or("", |name| name.as_str());
-        let rank = [
+        let rank_fields = [
             row.rank.to_string(),
             row.rank_group.to_string(),
             "false".to_owned(),
             String::new(),
         ];
         table.row(
-            rank.into_iter()
+            rank_fields
+                .into_iter()
                 .chain(common_fields!(competition, row, division)),
         );
     }
     for row in &board.baselines {
-        let rank = [
+        let rank_fields = [
             String::new(),
             String::new(),
             "true".to_owned(),
             row.hypothetical_rank.to_string(),
         ];
-        table.row(rank.into_iter().chain(common_fields!(competition, row, "")));
+        table.row(
+            rank_fields
+                .into_iter()
+                .chain(common_fields!(competition, row, "")),
+        );
     }
     table
 }
@@ -241,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn tables_without_tiers_lack_only_their_columns() {
+    fn tables_without_tiers_lack_only_the_tier_columns() {
         let competition = faceoff_airhockey::competition();
         let without = Competition {
             tiers: None,

@@ -4,7 +4,7 @@ use super::{
     document::{Binary, FileHeaders},
     downloads::{Download, download},
 };
-use crate::links::{self, LinkOr, LinkQuery};
+use crate::download_links::{self, LinkOr, LinkQuery};
 use axum::{Json, extract::State, http::StatusCode, response::Response};
 use faceoff_api::{
     paths,
@@ -83,7 +83,7 @@ pub(crate) async fn link_bundle(
 ) -> Result<(StatusCode, Json<LinkView>), Problem> {
     find_downloadable(&caller, &app, id).await?;
     let path = format!("{}/bundle", paths::submission(id));
-    links::link(&app, &caller, &path, request).await
+    download_links::link(&app, &caller, &path, request).await
 }
 
 /// A submission whose bundle the caller may download now.
@@ -94,7 +94,7 @@ async fn find_downloadable(
 ) -> Result<Submission, Problem> {
     let found = app.store.submission(id).await;
     let submission = caller.visible("submission", found, |submission| submission.team)?;
-    // Organisers can download evidence as long as the file exists, even after a deletion.
+    // The file of a deleted bundle may be kept as evidence, say of a disqualified team: organisers can download it as long as it exists.
     if !caller.is_organiser() {
         check_stored(&submission)?;
     }

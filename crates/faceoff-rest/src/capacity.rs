@@ -1,4 +1,5 @@
-//! Capacity forecasts: whether the evaluations of a stage's days will finish before their deadlines.
+//! Capacity forecasts: whether the evaluations of a stage's days will finish before their deadlines. A *slot* of a machine
+//! runs one job at a time.
 
 use axum::{Json, extract::State};
 use faceoff_api::views::capacity::CapacityView;

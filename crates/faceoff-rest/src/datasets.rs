@@ -7,7 +7,7 @@ use super::{
     proposals,
     stored_dataset::StoredDataset,
 };
-use crate::links::{self, LinkOr, LinkQuery};
+use crate::download_links::{self, LinkOr, LinkQuery};
 use axum::{
     Json,
     extract::State,
@@ -103,7 +103,7 @@ pub(crate) async fn link_dataset(
 ) -> Result<(StatusCode, Json<LinkView>), Problem> {
     find_dataset(Viewer::new(&caller), &app, id).await?;
     let path = format!("{}/dataset", paths::evaluation(id));
-    links::link(&app, &caller, &path, request).await
+    download_links::link(&app, &caller, &path, request).await
 }
 
 /// Returns the violated constraints and the slow answers by episode: the dataset's `violations.json`. Needs access to
@@ -211,7 +211,7 @@ async fn find_released(
         } => {
             check_released(app, &evaluation).await?;
             let exists = app.store.artifacts().size_bytes(dataset).await?.is_some();
-            // Organisers can download evidence as long as the file exists.
+            // The file of a removed dataset may be kept as evidence, say of a disqualified team: organisers can download it then.
             if let Some(removed) = &evaluation.dataset_removed
                 && !(viewer == Viewer::Organiser && exists)
             {

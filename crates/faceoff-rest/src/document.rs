@@ -1,16 +1,16 @@
 //! The OpenAPI document: everything that is not derived from the routes and types.
 
+mod competition_schemas;
+mod conditional_requests;
 mod deprecated_fields;
-mod files;
-mod integers;
-mod lists;
+mod flattened_enums;
+mod paged_lists;
 mod responses;
-mod tasks;
-mod unions;
+mod unsigned_integers;
 
+pub(super) use conditional_requests::{FileHeaders, TagHeader};
 use faceoff_service::problem::ProblemBody;
 use faceoff_types::Competition;
-pub(super) use files::{FileHeaders, TagHeader};
 use serde_json::Value;
 use utoipa::{
     Modify, OpenApi, PartialSchema, ToSchema,
@@ -28,9 +28,9 @@ use utoipa::{
                        Every GET resource also supports HEAD: the same headers without a body.",
         license(name = "MIT OR Apache-2.0")
     ),
-    // The tag of an operation says which token it needs.
     components(schemas(ProblemBody)),
     modifiers(&SecuritySchemes),
+    // The tag of an operation says which token it needs.
     tags(
         (name = "public", description = "No token required"),
         (name = "people", description = "Requires any valid token"),
@@ -68,15 +68,15 @@ impl Modify for SecuritySchemes {
     }
 }
 
-/// Completes the document with everything that follows from the routes, the types and the competition.
+/// Completes the document, which is derived from the routes and types, with everything that follows from them and from the competition.
 pub(super) fn complete(mut document: openapi::OpenApi, competition: &Competition) -> Value {
     responses::complete(&mut document);
     let components = document.components.get_or_insert_default();
-    unions::flatten(&mut components.schemas);
+    flattened_enums::flatten(&mut components.schemas);
     let mut document = serde_json::to_value(document).expect("its keys are strings");
-    tasks::describe(&mut document, competition);
+    competition_schemas::describe(&mut document, competition);
     deprecated_fields::add(&mut document);
-    integers::mark_unsigned(&mut document);
+    unsigned_integers::mark_unsigned(&mut document);
     document
 }
 

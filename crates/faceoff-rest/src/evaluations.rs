@@ -85,7 +85,7 @@ pub(crate) async fn evaluation(
         .map(Json)
 }
 
-/// Cancels an evaluation that has not ended. It can be rerun. If it was the last one of its day, the day is released.
+/// Cancels an evaluation that has not ended. It can be rerun. If it was the last unfinished one of its day, the day is released.
 #[utoipa::path(
     post, path = "/evaluations/{id}/cancel", tag = "organiser", security(("organiser" = [])),
     params(("id" = EvaluationId, Path)), request_body = Cancellation,

@@ -67,7 +67,7 @@ impl EventReader {
         // Subscribed before the log is read, so that no event is missed.
         let changes = app.store.events();
         let newest = app.store.newest_event().await?;
-        let (start, first_message) = match last_received {
+        let (start_id, first_message) = match last_received {
             None => (newest, Some("now")),
             Some(id) if id > newest || newest - id > MAX_BACKLOG => (newest, Some("reset")),
             Some(id) => (id, None),
@@ -78,8 +78,8 @@ impl EventReader {
             subscription,
             changes,
             first_message,
-            last_read: start,
-            last_sent: start,
+            last_read: start_id,
+            last_sent: start_id,
             next_read_at: now,
             ends_at: now + MAX_DURATION,
             shutdown,

@@ -5,7 +5,7 @@ use super::{
     document::{Binary, FileHeaders},
     downloads::{Download, download, file_stem},
 };
-use crate::links::{self, LinkOr, LinkQuery};
+use crate::download_links::{self, LinkOr, LinkQuery};
 use axum::{
     Json,
     extract::State,
@@ -101,7 +101,7 @@ pub(crate) async fn link_side(
     let (id, side) = parse_side(&path)?;
     StoredRecording::find(&app, Viewer::new(&caller), id, GameFile::Side(side)).await?;
     let path = format!("{}/sides/{}", paths::game(id), side.number());
-    links::link(&app, &caller, &path, request).await
+    download_links::link(&app, &caller, &path, request).await
 }
 
 /// Creates a link that downloads the recording of both sides without a token for a limited time. For callers who may
@@ -127,7 +127,7 @@ pub(crate) async fn link_recording(
 ) -> Result<(StatusCode, Json<LinkView>), Problem> {
     StoredRecording::find(&app, Viewer::new(&caller), id, GameFile::BothSides).await?;
     let path = format!("{}/recording", paths::game(id));
-    links::link(&app, &caller, &path, request).await
+    download_links::link(&app, &caller, &path, request).await
 }
 
 /// Returns the faults and the last part of the standard error of a side's agent, from the attempt that counts. For its

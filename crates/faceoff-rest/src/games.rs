@@ -1,4 +1,5 @@
-//! Games of two submissions in a tournament: listing, cancelling, voiding and rerunning them.
+//! Games of two submissions in a tournament: listing, cancelling, voiding and rerunning them. A *schedule replay* is one of the
+//! games that repeat the tournament's schedule with other seeds; it does not count.
 
 use crate::paging::{ListQuery, Page, PageQuery, Paged};
 use axum::{Json, extract::State};

@@ -5,7 +5,7 @@ use faceoff_api::views::health::{HealthView, LiveView};
 use faceoff_service::{app::App, problem::Problem, views::health};
 
 /// Readiness: checks that the database is writable (by a test write, at most once a second), the queue makes progress,
-/// the disks have free space, and the system clock was not set.
+/// the disks have free space, and the system clock has not been set to another time.
 ///
 /// Otherwise the response is a problem whose `database`, `queue`, `free_space` and `clock` say what is wrong.
 #[utoipa::path(

@@ -78,7 +78,7 @@ pub(crate) async fn revoke_invitation(
     revoked.await.map(Json)
 }
 
-/// Accepts an invitation: creates a user with its role, or gives one access again, and returns a token, which is shown only once.
+/// Accepts an invitation: creates a user with its role, or gives a returning user access again. Returns a token, which is shown only once.
 #[utoipa::path(
     post, path = "/invitations/accept", tag = "people", request_body = JoinRequest,
     responses(

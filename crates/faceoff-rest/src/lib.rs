@@ -8,14 +8,16 @@ mod board;
 mod board_csv;
 mod board_freezes;
 mod bundles;
+mod calling_team;
 mod capacity;
 mod clip_response;
 mod clips;
-mod clock;
+mod clock_acceptance;
 mod comparisons;
 mod datasets;
 mod deprecated_routes;
 mod document;
+mod download_links;
 mod downloads;
 mod entrants;
 mod episode_count;
@@ -31,10 +33,8 @@ mod game_files;
 mod games;
 mod health;
 mod invitations;
-mod links;
 mod live_game;
 mod live_reader;
-mod me;
 mod organiser_decisions;
 mod paging;
 mod partial_uploads;
@@ -132,7 +132,7 @@ fn season_routes() -> OpenApiRouter<App> {
         .routes(routes!(board::board))
         .routes(routes!(board::board_history))
         .routes(routes!(board::task_board))
-        .routes(routes!(me::me))
+        .routes(routes!(calling_team::me))
         .routes(routes!(capacity::capacity))
         .routes(routes!(events::list_events))
         .routes(routes!(event_stream::follow_events))
@@ -210,7 +210,7 @@ fn stage_routes() -> OpenApiRouter<App> {
         .routes(routes!(organiser_decisions::disqualify_team))
         .routes(routes!(organiser_decisions::pause_queue))
         .routes(routes!(organiser_decisions::resume_queue))
-        .routes(routes!(clock::accept_clock))
+        .routes(routes!(clock_acceptance::accept_clock))
         .routes(routes!(organiser_decisions::reinstate_team))
 }
 

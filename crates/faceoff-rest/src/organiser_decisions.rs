@@ -16,7 +16,7 @@ use faceoff_service::{
 };
 use faceoff_types::{EvaluationId, StageId, TeamId};
 
-/// Voids a finished evaluation or an agent failure: it disappears from the boards and does not count. It stays readable
+/// Voids an evaluation that has finished or that agent faults ended: it disappears from the boards and does not count. It stays readable
 /// and can be rerun.
 #[utoipa::path(
     post, path = "/evaluations/{id}/void", tag = "organiser", security(("organiser" = [])),

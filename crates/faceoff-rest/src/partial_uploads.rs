@@ -29,7 +29,7 @@ const UPLOAD_LENGTH: HeaderName = HeaderName::from_static("upload-length");
     params(("blake3" = String, Path, description = "BLAKE3 hash of the whole bundle, 64 hexadecimal digits")),
     responses(
         (status = 200, body = PartialUploadView),
-        (status = 400, description = "no hash"),
+        (status = 400, description = "not a BLAKE3 hash"),
         (status = 404, description = "no part of it has arrived, or none within the last day"),
     )
 )]
@@ -57,7 +57,7 @@ pub(crate) async fn partial_upload(
     request_body(description = "the bytes", content((inline(Binary) = "application/octet-stream"))),
     responses(
         (status = 200, body = PartialUploadView),
-        (status = 400, description = "no hash, a header is missing, or the part is longer than the bundle"),
+        (status = 400, description = "not a BLAKE3 hash, a header is missing, or the part is longer than the bundle"),
         (status = 408, description = "the upload stalled, or was too slow; what has arrived is kept"),
         (status = 409, description = "the part does not follow what has arrived (`received_bytes`), a newer connection has taken the upload over, the season is closed, or the team's storage is full"),
         (status = 413, description = "larger than `max_bundle_bytes`"),
@@ -98,7 +98,7 @@ pub(crate) async fn add_part(
     params(("blake3" = String, Path, description = "BLAKE3 hash of the whole bundle, 64 hexadecimal digits")),
     responses(
         (status = 204),
-        (status = 400, description = "no hash"),
+        (status = 400, description = "not a BLAKE3 hash"),
         (status = 404, description = "no part of it has arrived"),
     ),
 )]

@@ -26,7 +26,7 @@ use faceoff_service::{
         (status = 401, description = "wrong name or password"),
         (status = 403, description = "the request comes from a page of another site"),
         (status = 429, description = "too many wrong passwords"),
-        (status = 503, description = "too many sign-ins at the moment, or of this address"),
+        (status = 503, description = "too many sign-ins at the moment, in all or from this address"),
     )
 )]
 pub(crate) async fn create_session(

@@ -46,7 +46,7 @@ pub(super) fn take_permit(
     let precedence = caller.map_or(Precedence::Visitor, Caller::precedence);
     readers.take(precedence).ok_or_else(|| {
         let (taken, max) = (readers.taken(), readers.max());
-        let kept = if taken < max {
+        let reserved_note = if taken < max {
             ", and the last ones are kept for teams and organisers"
         } else {
             ""
@@ -54,7 +54,7 @@ pub(super) fn take_permit(
         Problem::new(
             ProblemKind::Busy,
             format!(
-                "{taken} of the {max} places for readers of {stream} are taken{kept}; try again later, or poll {polled}"
+                "{taken} of the {max} places for readers of {stream} are taken{reserved_note}; try again later, or poll {polled}"
             ),
         )
     })

@@ -1,4 +1,4 @@
-//! Where the dataset of an evaluation, which is its recording, is stored.
+//! Where the dataset of an evaluation, which is its recording, is stored; for routes that send it or read it.
 
 use faceoff_types::TeamId;
 use jiff::civil::Date;

@@ -56,8 +56,8 @@ const BUNDLE_TYPES: [&str; 8] = [
 ///
 /// It is unpacked and checked in a validation run; poll the submission until its state is `valid` or `invalid`.
 ///
-/// With a header `Idempotency-Key` the request can be sent again after a broken connection: a second upload of the same bundle with the same
-/// key returns the submission of the first one.
+/// With a header `Idempotency-Key` the request can be sent again after a broken connection: a second upload of the same bundle with the
+/// same key returns the submission of the first one.
 #[utoipa::path(
     post, path = "/submissions", tag = "team", security(("team" = [])),
     params(
@@ -142,7 +142,7 @@ fn check_media_type(headers: &HeaderMap) -> Result<(), Problem> {
         return Ok(());
     };
     let text = value.to_str().unwrap_or("(not text)");
-    // Without parameters.
+    // Without parameters such as `charset`.
     let media_type = text
         .split(';')
         .next()

@@ -287,24 +287,24 @@ fn bench_control_steps(criterion: &mut Criterion) {
         .map(|_| {
             let cpu_time_before_s = cpu_time_s();
             steps = play_unrecorded(&agent, &env, &spec);
-            let bare_s = cpu_time_s() - cpu_time_before_s;
+            let unrecorded_s = cpu_time_s() - cpu_time_before_s;
             let cpu_time_before_s = cpu_time_s();
             run_shard(&spec, &agent.bundle, &env, out.path(), &mut NullObserver).unwrap();
-            (bare_s, cpu_time_s() - cpu_time_before_s)
+            (unrecorded_s, cpu_time_s() - cpu_time_before_s)
         })
         .skip(1)
         .collect();
     rounds.sort_by(|a, b| (a.1 / a.0).total_cmp(&(b.1 / b.0)));
-    let (bare_s, recorded_s) = rounds[RECORDING_ROUNDS / 2];
+    let (unrecorded_s, recorded_s) = rounds[RECORDING_ROUNDS / 2];
     let bytes = fs::metadata(out.path().join("steps.parquet"))
         .unwrap()
         .len();
     println!(
         "{steps} steps: {:.1} us of CPU time per step without recording, {:.1} us with it \
          ({:+.1} %, median of {RECORDING_ROUNDS} rounds); {:.0} bytes per step",
-        1e6 * bare_s / f64::from(steps),
+        1e6 * unrecorded_s / f64::from(steps),
         1e6 * recorded_s / f64::from(steps),
-        100.0 * (recorded_s / bare_s - 1.0),
+        100.0 * (recorded_s / unrecorded_s - 1.0),
         bytes as f64 / f64::from(steps)
     );
 }

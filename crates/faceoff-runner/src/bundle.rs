@@ -106,7 +106,7 @@ fn unpack_within<'a>(
                 .to_owned(),
         ));
     }
-    let read = read_archive(
+    let format = read_archive(
         &mut tree,
         file,
         packed_bytes,
@@ -114,7 +114,7 @@ fn unpack_within<'a>(
         budget,
     );
     let format = budget
-        .prefer_own_failure(read)
+        .prefer_own_failure(format)
         .map_err(|error| tree.explain_refusal(error))?;
     match (tree.bundle_root(MANIFEST_NAME), format) {
         (Some(_), ArchiveFormat::Tar) => Err(BundleError::Invalid(

@@ -1,6 +1,6 @@
 //! The *noise floor* of a worker's slot: the time of a round trip (question and answer) with an agent that computes
-//! nothing. This calibration agent is a thread of the service on the agent's CPUs, which answers at once, with messages
-//! as long as those of a step. While the real agent runs, the thread waits in a read and uses no CPU time.
+//! nothing. This *calibration agent* is no agent of a team, but a thread of this process on the agent's CPUs, which answers
+//! at once, with messages as long as those of a step. While the real agent runs, the thread waits in a read and uses no CPU time.
 
 use crate::fault::PlatformFault;
 use faceoff_sandbox::affinity::pin_current_thread;
@@ -28,7 +28,7 @@ struct CalibrationAgent {
     /// `None` only while it is being dropped.
     to_agent: Option<UnixStream>,
     from_agent: UnixStream,
-    agent: Option<JoinHandle<()>>,
+    thread: Option<JoinHandle<()>>,
 }
 
 impl CalibrationAgent {
@@ -45,7 +45,7 @@ impl CalibrationAgent {
         // An observation of 23 numbers of full precision.
         Message::step(0, &[-std::f64::consts::FRAC_1_PI; 23]).write_line(&mut question);
         let (cpus, question_bytes) = (agent_cpus.to_vec(), question.len());
-        let agent = thread::Builder::new()
+        let thread = thread::Builder::new()
             .name("calibration".to_owned())
             .spawn(move || answer(&cpus, question_bytes, questions, answers))
             .map_err(failed())?;
@@ -54,7 +54,7 @@ impl CalibrationAgent {
             answer: vec![0; ANSWER_BYTES],
             to_agent: Some(to_agent),
             from_agent,
-            agent: Some(agent),
+            thread: Some(thread),
         })
     }
 
@@ -84,8 +84,9 @@ impl CalibrationAgent {
 impl Drop for CalibrationAgent {
     fn drop(&mut self) {
         self.to_agent = None;
-        if let Some(agent) = self.agent.take()
-            && agent.join().is_err()
+        // With the channel closed, the thread ends.
+        if let Some(thread) = self.thread.take()
+            && thread.join().is_err()
         {
             tracing::error!("the calibration agent panicked");
         }
@@ -157,15 +158,15 @@ fn answer(
 /// Median, 99th percentile (both nearest rank) and maximum; zeros without a round trip.
 fn summarise(times_s: &mut [f64]) -> RoundTrips {
     times_s.sort_unstable_by(f64::total_cmp);
-    let rank = |percent: usize| times_s[(times_s.len() * percent).div_ceil(100).max(1) - 1];
+    let percentile = |percent: usize| times_s[(times_s.len() * percent).div_ceil(100).max(1) - 1];
     if times_s.is_empty() {
         return RoundTrips::default();
     }
     RoundTrips {
         count: u32::try_from(times_s.len()).unwrap_or(u32::MAX),
-        p50: rank(50),
-        p99: rank(99),
-        max: rank(100),
+        p50: percentile(50),
+        p99: percentile(99),
+        max: percentile(100),
     }
 }
 

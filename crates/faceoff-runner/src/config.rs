@@ -6,7 +6,7 @@ use faceoff_sandbox::{Isolation, Layer, Limits, Runtime};
 use faceoff_types::{IMAGE_RUNTIME, TimeLimits};
 use std::{collections::BTreeMap, sync::Arc};
 
-/// The environment of agents on this host.
+/// The environment of agents on this host; called `env` in this crate, as opposed to environment *variables*.
 #[derive(Debug, Clone)]
 pub struct AgentEnvironment {
     /// Resource limits of an agent's process tree.

@@ -66,7 +66,7 @@ impl CpuUsage {
     }
 
     /// CPU time since the answer before the last question, in seconds.
-    pub fn since_answer_s(&self, cpu_time_s: Option<f64>) -> Option<f64> {
+    pub fn since_earlier_answer_s(&self, cpu_time_s: Option<f64>) -> Option<f64> {
         difference_s(self.cpu_at_earlier_answer_s, cpu_time_s)
     }
 }
@@ -103,7 +103,7 @@ mod tests {
         ));
         let cpu_time_s = Some(1.009);
         assert!((cpu.since_question_s(cpu_time_s).unwrap() - 0.002).abs() < 1e-9);
-        assert!((cpu.since_answer_s(cpu_time_s).unwrap() - 0.009).abs() < 1e-9);
+        assert!((cpu.since_earlier_answer_s(cpu_time_s).unwrap() - 0.009).abs() < 1e-9);
         cpu.record_answer(asked_at + MS(5), cpu_time_s);
         // Time that the kernel charges late cannot have been used within the gap.
         let asked_at = cpu.answered_at + MS(1);

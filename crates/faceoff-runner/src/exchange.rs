@@ -14,7 +14,7 @@ use crate::{
     wait_breakdown::WaitBreakdown,
 };
 use faceoff_sandbox::{
-    AgentProcess, AnswerState, Baseline, Layer, ReadLine, Runtime, SpawnError, SpawnSpec,
+    AgentProcess, AnswerState, CounterBaseline, Layer, ReadLine, Runtime, SpawnError, SpawnSpec,
     WriteError, affinity,
 };
 use faceoff_types::{AgentFaultKind, Phase, TimeLimits};
@@ -38,9 +38,9 @@ pub(crate) struct Exchange<'w> {
     /// The CPUs of the calling thread, if the agent may use none of them.
     evaluator_cpus: Option<Vec<usize>>,
     /// Did the last answer take less than [`SPIN_TIME`]?
-    is_quick: bool,
+    was_quick: bool,
     /// The counters before a recent question.
-    baseline: Option<Arc<Baseline>>,
+    baseline: Option<Arc<CounterBaseline>>,
     /// The message being sent; its memory is reused.
     line: Vec<u8>,
     /// CPU time of the agent at its questions and answers.
@@ -122,7 +122,7 @@ impl<'w> Exchange<'w> {
             process,
             monitor,
             evaluator_cpus,
-            is_quick: false,
+            was_quick: false,
             baseline: None,
             line: Vec::with_capacity(4096),
             exit_grace: TimeLimits::duration(env.time.bye_s),
@@ -203,7 +203,7 @@ impl<'w> Exchange<'w> {
 
     /// The counters before a question, at most [`BASELINE_MAX_AGE`] old: reading them for each question to a quick
     /// agent would cost more than the answer. They are kernel files, so no agent can block the read.
-    fn read_baseline(&mut self, phase: Phase) -> Arc<Baseline> {
+    fn read_baseline(&mut self, phase: Phase) -> Arc<CounterBaseline> {
         if phase != Phase::Step {
             self.process.track_threads();
             self.baseline = None;
@@ -246,7 +246,7 @@ impl<'w> Exchange<'w> {
         question: &mut PendingQuestion,
         deadline: Instant,
     ) -> Result<Option<Answer>, SessionError> {
-        if self.evaluator_cpus.is_some() && self.is_quick {
+        if self.evaluator_cpus.is_some() && self.was_quick {
             self.process
                 .spin_until(deadline.min(question.wait.asked_at + SPIN_TIME))?;
         }
@@ -329,7 +329,7 @@ impl<'w> Exchange<'w> {
         let cpu_time_s = self.process.cpu_time_s();
         let wait = self.wait_breakdown(question, received_at, cpu_time_s, AnswerState::Received);
         self.cpu.record_answer(received_at, cpu_time_s);
-        self.is_quick = wait.wall < SPIN_TIME;
+        self.was_quick = wait.wall < SPIN_TIME;
         Answer { bytes, wait }
     }
 
@@ -377,7 +377,7 @@ impl<'w> Exchange<'w> {
             wall: now.saturating_duration_since(question.wait.asked_at),
             host_interference: self.host_interference(&question.wait, now, run_time_s, answer),
             early_cpu_time: question.early_cpu_time,
-            cpu_time_s: self.cpu.since_answer_s(cpu_time_s),
+            cpu_time_s: self.cpu.since_earlier_answer_s(cpu_time_s),
         }
     }
 
@@ -415,7 +415,7 @@ impl<'w> Exchange<'w> {
         wait.interference(self.monitor, counters)
     }
 
-    /// Gives the agent `grace` to exit, then kills it; returns the end of its standard error.
+    /// Gives the agent `grace` to exit, then kills it; returns its standard error (its beginning and end, if it is long).
     pub fn finish(self, grace: Duration) -> Result<String, PlatformFault> {
         let Self {
             process,

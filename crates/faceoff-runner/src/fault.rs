@@ -17,7 +17,8 @@ pub enum SessionError {
         /// The offending line, shortened, if there is one.
         line: Option<String>,
     },
-    /// The agent did not answer within a hard limit, and host interference does not explain that.
+    /// The agent did not answer within a hard limit (the time after which a missing answer is a fault), and host interference does not
+    /// explain that.
     TimedOut {
         fault: AgentFaultKind,
         wait: Box<WaitBreakdown>,

@@ -2,7 +2,7 @@
 //! run. It is as much as the kernel's counters prove, and is determined for late answers only. Before an answer is
 //! late, only a baseline (the counters before the question) is read, which costs a few microseconds.
 
-use faceoff_sandbox::{Baseline, CpuReading, CpuSamples, EvaluatorCounters};
+use faceoff_sandbox::{CounterBaseline, CpuReading, CpuSamples, EvaluatorCounters};
 use std::{
     sync::Arc,
     time::{Duration, Instant},
@@ -47,7 +47,7 @@ pub(crate) struct AnswerWait {
     pub asked_at: Instant,
     limit: Duration,
     /// The counters before the question, at most [`BASELINE_MAX_AGE`] older.
-    baseline: Option<Arc<Baseline>>,
+    baseline: Option<Arc<CounterBaseline>>,
     /// Delay of the evaluator while it wrote the question.
     write_delay: Duration,
     /// Set once the answer is late. The inner value is `None` if the host has no counters.
@@ -78,7 +78,7 @@ impl AnswerWait {
     /// Starts a wait whose limit runs from `asked_at`. `written_at` is the time at which the non-blocking write of the
     /// question returned.
     pub fn begin(
-        baseline: Option<Arc<Baseline>>,
+        baseline: Option<Arc<CounterBaseline>>,
         asked_at: Instant,
         written_at: Instant,
         limit: Duration,

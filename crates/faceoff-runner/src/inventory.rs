@@ -19,7 +19,7 @@ const TIMEOUT: Duration = Duration::from_secs(60);
 const MAX_LINE_BYTES: usize = 1 << 20;
 /// Dynamic loaders, which print the version of the C library in a runtime without an interpreter.
 const LOADERS: [&str; 2] = ["/lib64/ld-linux-x86-64.so.2", "/lib/ld-linux-aarch64.so.1"];
-/// Prints one line of JSON.
+/// Program for a runtime's Python; prints one line of JSON, a [`PythonReport`].
 const SCRIPT: &str = include_str!("inventory.py");
 
 /// Inspects each runtime of `env`, one after another, on the CPUs and within the limits of an agent. A runtime that
@@ -55,8 +55,8 @@ fn inspect(env: &AgentEnvironment, runtime: &Runtime) -> Result<RuntimeContent, 
         .is_some_and(|python| is_visible(&python))
     {
         let line = first_line(env, runtime, &["python3", "-c", SCRIPT])?;
-        return serde_json::from_str::<Answer>(&line)
-            .map(|answer| RuntimeContent::Python(answer.into()))
+        return serde_json::from_str::<PythonReport>(&line)
+            .map(|report| RuntimeContent::Python(report.into()))
             .map_err(|error| {
                 format!("expected one line of JSON from its python3, got {line:?}: {error}")
             });
@@ -70,7 +70,7 @@ fn inspect(env: &AgentEnvironment, runtime: &Runtime) -> Result<RuntimeContent, 
 
 /// Output of `inventory.py`.
 #[derive(Deserialize)]
-struct Answer {
+struct PythonReport {
     implementation: String,
     version: String,
     libc: Option<String>,
@@ -78,14 +78,14 @@ struct Answer {
     unusable_packages: BTreeMap<String, String>,
 }
 
-impl From<Answer> for PythonInventory {
-    fn from(answer: Answer) -> Self {
+impl From<PythonReport> for PythonInventory {
+    fn from(report: PythonReport) -> Self {
         Self {
-            implementation: answer.implementation,
-            version: answer.version,
-            libc: answer.libc,
-            packages: answer.packages,
-            unusable_packages: answer.unusable_packages,
+            implementation: report.implementation,
+            version: report.version,
+            libc: report.libc,
+            packages: report.packages,
+            unusable_packages: report.unusable_packages,
         }
     }
 }

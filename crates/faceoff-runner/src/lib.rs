@@ -8,7 +8,6 @@
 //! This crate reads no environment variable and no configuration file, speaks no HTTP and uses no
 //! database. It measures time around the agent's channel; all other results follow from the seeds.
 
-mod budget;
 pub mod bundle;
 mod calibration;
 mod config;
@@ -23,6 +22,7 @@ mod player;
 mod session;
 mod shard;
 mod supervisor;
+mod time_budget;
 mod validation;
 mod wait_breakdown;
 

@@ -1,4 +1,4 @@
-//! The log of an agent, as its team reads it: its standard error, with its faults.
+//! The log of an agent, as its team reads it: its standard error (its beginning and end, if it is long), with its faults.
 
 use anstream::adapter::strip_str;
 use faceoff_sandbox::BoundedLog;
@@ -8,7 +8,7 @@ use std::borrow::Cow;
 /// The standard error of an agent's successive processes: its beginning and its end, as a terminal shows them.
 #[derive(Debug)]
 pub(crate) struct Log {
-    kept: BoundedLog,
+    bounded: BoundedLog,
     is_at_line_start: bool,
 }
 
@@ -16,7 +16,7 @@ impl Log {
     /// An empty log that keeps at most `max_bytes`.
     pub fn new(max_bytes: u64) -> Self {
         Self {
-            kept: BoundedLog::new(max_bytes),
+            bounded: BoundedLog::new(max_bytes),
             is_at_line_start: true,
         }
     }
@@ -33,14 +33,14 @@ impl Log {
     }
 
     fn push(&mut self, text: &str) {
-        self.kept.push(text.as_bytes());
+        self.bounded.push(text.as_bytes());
         if !text.is_empty() {
             self.is_at_line_start = text.ends_with('\n');
         }
     }
 
     pub fn into_text(self) -> String {
-        self.kept.text()
+        self.bounded.text()
     }
 }
 

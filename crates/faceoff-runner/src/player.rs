@@ -2,13 +2,13 @@
 //! machine) ended.
 
 use crate::{
-    budget::{EpisodeBudget, ResetBudget},
     bundle::Bundle,
     config::AgentEnvironment,
     fault::{PlatformFault, SessionError},
     host_interference::InterferenceMonitor,
     log::Log,
     session::Session,
+    time_budget::{EpisodeBudget, ResetBudget},
     wait_breakdown::WaitBreakdown,
 };
 use faceoff_episode::{ActionRequest, RunningEpisode, StepSink, WorldFactory};
@@ -59,10 +59,10 @@ struct Try {
     blame: Blame,
 }
 
-/// Attribution of a try's end.
+/// To whom the end of a try is attributed.
 #[derive(Debug, Clone, Copy)]
 enum Blame {
-    /// The agent's answers.
+    /// The agent's answers: an ordinary end of the episode, or a fault other than a timeout.
     Agent,
     /// A timeout of the agent.
     AgentTimeout(WaitBreakdown),
@@ -159,7 +159,7 @@ impl<'a> Player<'a> {
         sink: &mut dyn StepSink,
         cancelled: &dyn Fn() -> bool,
     ) -> Result<EpisodeOutcome, PlatformFault> {
-        let mut reruns = 0;
+        let mut episode_reruns = 0;
         loop {
             let Try { outcome, blame } = self.run_try(episode, max_steps, sink, cancelled)?;
             self.last_wait = match blame {
@@ -167,14 +167,14 @@ impl<'a> Player<'a> {
                 Blame::AgentTimeout(wait) | Blame::Host(wait) => Some(wait),
             };
             if let Blame::Host(wait) = blame {
-                let reruns_used = &mut self.reruns;
-                if reruns < reruns_used.per_episode && reruns_used.count < reruns_used.limit {
-                    reruns += 1;
-                    reruns_used.count += 1;
+                let total = &mut self.reruns;
+                if episode_reruns < total.per_episode && total.count < total.limit {
+                    episode_reruns += 1;
+                    total.count += 1;
                     tracing::warn!(
                         task = %self.task,
                         episode,
-                        reruns,
+                        reruns = episode_reruns,
                         %wait,
                         "host interference prevented an answer: the episode is run again"
                     );
@@ -187,7 +187,7 @@ impl<'a> Player<'a> {
                     return Err(PlatformFault::HostBusy(wait));
                 }
             }
-            sink.end(&outcome, reruns)?;
+            sink.end(&outcome, episode_reruns)?;
             return Ok(outcome);
         }
     }
@@ -278,7 +278,7 @@ impl<'a> Player<'a> {
         }
     }
 
-    /// Runs the exchange of one episode; an error comes with the phase in which it happened.
+    /// Runs one episode's messages with the agent; an error comes with the phase in which it happened.
     fn run_episode(
         &mut self,
         session: &mut Session<'_>,

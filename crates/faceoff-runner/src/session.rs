@@ -33,6 +33,7 @@ pub struct Session<'w> {
 #[derive(Debug, Clone)]
 struct SentQuestion {
     question: Question,
+    /// Its limit, and the measurement of the wait for its answer.
     pending_question: PendingQuestion,
 }
 
@@ -46,7 +47,7 @@ impl Session<'static> {
     /// Starts the bundle's command and exchanges `hello` and `ready`.
     ///
     /// # Errors
-    /// The failure, and the end of the agent's standard error.
+    /// The failure, and the agent's standard error (its beginning and end, if it is long).
     pub fn start(
         bundle: &Bundle,
         env: &AgentEnvironment,
@@ -66,8 +67,8 @@ impl<'w> Session<'w> {
     ) -> Result<Self, (SessionError, String)> {
         let mut exchange =
             Exchange::start(bundle, env, monitor).map_err(|error| (error, String::new()))?;
-        let stated = bundle.manifest.interpolation;
-        match hello(&mut exchange, agent_task, stated, env) {
+        let stated_interpolation = bundle.manifest.interpolation;
+        match exchange_hello(&mut exchange, agent_task, stated_interpolation, env) {
             Ok((layout, startup_s)) => Ok(Self {
                 exchange,
                 time: env.time.clone(),
@@ -116,7 +117,7 @@ impl<'w> Session<'w> {
         &self.action
     }
 
-    /// Announces an episode.
+    /// Announces an episode, or a rally of a game, without waiting.
     ///
     /// # Errors
     /// An agent fault or a platform fault.
@@ -124,7 +125,7 @@ impl<'w> Session<'w> {
         self.send(Question::Reset { episode }, &Message::Reset { episode })
     }
 
-    /// Requests the action of a step; the observation must be finite.
+    /// Requests the action of a step, without waiting; the observation must be finite.
     ///
     /// # Errors
     /// An agent fault or a platform fault.
@@ -244,7 +245,7 @@ impl<'w> Session<'w> {
         })
     }
 
-    /// Sends the end of an episode. If the agent's input is closed, the next question reports the fault.
+    /// Sends the end of an episode or rally. If the agent's input is closed, the next question reports the fault.
     ///
     /// # Errors
     /// Platform faults only.
@@ -253,8 +254,8 @@ impl<'w> Session<'w> {
         self.exchange.notify(&end)
     }
 
-    /// Sends `bye`, waits for the exit, kills the remaining processes, and returns the end of the agent's standard
-    /// error.
+    /// Sends `bye`, waits for the exit, kills the remaining processes, and returns the agent's standard error (its
+    /// beginning and end, if it is long).
     ///
     /// # Errors
     /// Platform faults only: the agent's exit status does not matter any more.
@@ -263,18 +264,18 @@ impl<'w> Session<'w> {
         self.exchange.finish(TimeLimits::duration(self.time.bye_s))
     }
 
-    /// Kills the agent and returns the end of its standard error.
+    /// Kills the agent and returns its standard error (its beginning and end, if it is long).
     pub fn abort(self) -> String {
         abort(self.exchange)
     }
 }
 
-/// Exchanges `hello` and `ready`; returns the layout of the agent's actions and the start-up time in seconds. `stated`: the
-/// interpolation in `agent.toml`.
-fn hello(
+/// Exchanges `hello` and `ready`; returns the layout of the agent's actions and the start-up time in seconds. `stated_interpolation`:
+/// the one in `agent.toml`.
+fn exchange_hello(
     exchange: &mut Exchange<'_>,
     agent_task: AgentTask,
-    stated: Option<i64>,
+    stated_interpolation: Option<i64>,
     env: &AgentEnvironment,
 ) -> Result<(ActionLayout, f64), SessionError> {
     let constants = env.simulator.hello_env(agent_task)?;
@@ -291,7 +292,7 @@ fn hello(
     let actions = &env.simulator.competition().actions;
     let ready =
         answer::parse_ready(&answer.bytes, actions).map_err(|fault| answer.to_error(fault))?;
-    match stated {
+    match stated_interpolation {
         Some(stated) if actions.agents_choose_layout && ready.layout.code() != Some(stated) => {
             Err(answer.to_error(AgentFaultKind::WrongMessage {
                 expected: format!("ready with interpolation {stated}, as agent.toml says"),

@@ -19,10 +19,10 @@ use std::path::Path;
 pub trait Observer {
     /// An episode is over.
     fn on_episode_end(&mut self, outcome: &EpisodeOutcome);
-    /// The end of the agent's standard error with its faults. Called exactly once, even if there is no report because
-    /// the shard was cancelled or the platform failed.
+    /// The agent's standard error (its beginning and end, if it is long), with its faults. Called exactly once, even if there is no
+    /// report because the shard was cancelled or the platform failed.
     fn log(&mut self, _log: &str) {}
-    /// The agent runs: it has answered `hello`. Called again before each reset and each step, so it must be cheap.
+    /// The agent runs, since it has answered `hello`. Called before each reset and each step, so it must be cheap.
     fn on_agent_running(&self) {}
     /// Should the shard stop? Called before each reset and each step, so it must be cheap.
     fn cancelled(&self) -> bool;
@@ -77,7 +77,7 @@ pub fn play_shard(
     observer: &mut dyn Observer,
     monitor: &dyn InterferenceMonitor,
 ) -> Result<ShardReport, PlatformFault> {
-    let _pinned = AffinityGuard::avoid(&env.agent_cpus);
+    let _affinity_guard = AffinityGuard::avoid(&env.agent_cpus);
     let world_factory = env.simulator.world_factory(&shard_conditions(spec))?;
     let mut calibration = Calibration::start(&env.agent_cpus)?;
     let mut player = Player::new(

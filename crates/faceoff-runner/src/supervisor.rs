@@ -20,7 +20,7 @@ use std::{
 const CHECK_INTERVAL: Duration = Duration::from_millis(250);
 /// After a longer pause between two checks, the second one proves nothing about evaluators: the host, or this process, was stopped.
 const MAX_CHECK_PAUSE: Duration = Duration::from_secs(1);
-/// Time without progress that an evaluator may take beyond the sum of its job's limits.
+/// Time that a call of an evaluator may take beyond the end by the evaluator's own limits, before the agent is blamed.
 const SLACK: Duration = Duration::from_secs(10);
 /// A thread that is still blocked this long after the agent's death is stuck: something else blocks it.
 const STUCK_AFTER_DEATH: Duration = Duration::from_secs(5);
@@ -42,7 +42,7 @@ impl Supervision {
         }
     }
 
-    /// Replaces the slack, for faster tests.
+    /// Replaces the slack (the time beyond the evaluator's own limits), for faster tests.
     #[must_use]
     pub fn with_slack(self, slack: Duration) -> Self {
         Self { slack, ..self }
@@ -87,7 +87,7 @@ struct Agent {
     /// 0, or 1 + the [`KillReason`].
     kill_reason: AtomicU8,
     killed_at_ns: AtomicU64,
-    /// The deadline that had passed at the last check, or 0.
+    /// The deadline that had passed at the last check; 0 if none had.
     overdue_ns: AtomicU64,
 }
 
@@ -188,7 +188,7 @@ impl Agent {
     }
 }
 
-/// Names of the threads that are still blocked after their agent's death.
+/// Names of the evaluators' threads that are still blocked seconds after their agent's death.
 #[must_use]
 pub fn stuck_threads() -> Vec<String> {
     let now = Instant::now();

@@ -27,9 +27,9 @@ pub const VALIDATION_STEPS: u32 = 250;
 pub struct ValidationReport {
     /// Why the submission is invalid; `None` if it is valid.
     pub failure: Option<ValidationFailure>,
-    /// Answer times of the evaluated tasks.
+    /// Answer times of the tasks that were played, in their order; a failure ends the run.
     pub timing: Vec<ValidationTiming>,
-    /// The end of the agent's standard error.
+    /// The agent's standard error (its beginning and end, if it is long), with its faults.
     pub log: String,
 }
 
@@ -118,7 +118,7 @@ pub fn validate_monitored(
     cancelled: &dyn Fn() -> bool,
     monitor: &dyn InterferenceMonitor,
 ) -> Result<ValidationReport, PlatformFault> {
-    let _pinned = AffinityGuard::avoid(&env.agent_cpus);
+    let _affinity_guard = AffinityGuard::avoid(&env.agent_cpus);
     let world_factory = env.simulator.world_factory(&Conditions {
         ruleset: spec.ruleset,
         profile: spec.profile,
@@ -129,13 +129,16 @@ pub fn validate_monitored(
     let mut timing = Vec::with_capacity(spec.tasks.len());
     let mut log = Log::new(env.limits.stderr_kept_bytes);
     for task in spec.tasks.iter().copied() {
-        let TaskPlan { mut shards, steps } = TaskPlan::new(spec, task);
+        let TaskPlan {
+            mut shards,
+            min_steps,
+        } = TaskPlan::new(spec, task);
         let mut answers = Answers::default();
         let mut outcomes: Vec<EpisodeOutcome> = Vec::new();
         let mut wait = None;
         let is_complete = |answers: &Answers, outcomes: &[EpisodeOutcome]| {
             let has_fault = outcomes.last().is_some_and(|last| last.fault.is_some());
-            has_fault || answers.timings.len() >= steps as usize
+            has_fault || answers.timings.len() >= min_steps as usize
         };
         // An agent plays one shard in an evaluation. If a shard is too short, another agent plays the next.
         while !is_complete(&answers, &outcomes) {
@@ -196,7 +199,7 @@ pub fn validate_monitored(
 struct TaskPlan {
     shards: Shards,
     /// Episodes are started until this many control steps are played.
-    steps: u32,
+    min_steps: u32,
 }
 
 impl TaskPlan {
@@ -213,7 +216,7 @@ impl TaskPlan {
                 count,
                 next: u32::from_le_bytes([a, b, c, d]) % count,
             },
-            steps: VALIDATION_STEPS + extra_steps,
+            min_steps: VALIDATION_STEPS + extra_steps,
         }
     }
 }
@@ -223,7 +226,9 @@ impl TaskPlan {
 struct Shards {
     episodes_per_task: u32,
     episodes_per_shard: u32,
+    /// Number of shards.
     count: u32,
+    /// Index of the next shard, from 0.
     next: u32,
 }
 
@@ -237,7 +242,7 @@ impl Shards {
     }
 }
 
-/// The answers of all episodes; if an episode is run again, only its last try counts.
+/// The times of the answers of all episodes, collected while they are played. If an episode is run again, only its last try counts.
 #[derive(Default)]
 struct Answers {
     timings: Vec<AnswerTiming>,
@@ -268,7 +273,7 @@ impl Answers {
         times_s.sort_unstable_by(f64::total_cmp);
         // Nearest rank of the 99th percentile, from 1.
         let rank = (times_s.len() * 99).div_ceil(100);
-        let points: f64 = outcomes
+        let penalty_points: f64 = outcomes
             .iter()
             .map(|outcome| computation_time_penalty(&outcome.computation_time))
             .sum();
@@ -278,7 +283,7 @@ impl Answers {
             mean_s: self.mean_s(|timing| timing.computation_time_s),
             p99_s: rank.checked_sub(1).map_or(0.0, |index| times_s[index]),
             max_s: times_s.last().copied().unwrap_or_default(),
-            points_per_episode: points / outcomes.len().max(1) as f64,
+            points_per_episode: penalty_points / outcomes.len().max(1) as f64,
             episodes: outcomes.len() as u32,
             violations: violated_limits(outcomes),
         }

@@ -9,7 +9,7 @@ pub struct WaitBreakdown {
     pub wall: Duration,
     /// Host interference in this time.
     pub host_interference: Duration,
-    /// CPU time of the agent's process tree between its last answer and this question.
+    /// CPU time of the agent's process tree between its last answer and this question. It counts as the agent's time.
     pub early_cpu_time: Duration,
     /// CPU time of the agent's process tree since its last answer, in seconds, if the host reports it.
     pub cpu_time_s: Option<f64>,

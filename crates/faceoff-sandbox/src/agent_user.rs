@@ -1,7 +1,7 @@
 //! The host user of an agent.
 //!
-//! Agents of an unprivileged service run as the service's user, confined to a user namespace. A root service
-//! must not run agents as root. Two agents must not share what the kernel accounts per user (processes, keys,
+//! The *service* is the process that starts agents. If it is unprivileged, they run as its user, confined to a user namespace. A root
+//! service must not run agents as root. Two agents must not share what the kernel accounts per user (processes, keys,
 //! pipes). So each agent of a root service gets its own user id from a range that distributions leave unused
 //! (0x7000_0000 to 0x7fff_ffff, unused according to systemd's list of user ids). It is drawn at random, since the
 //! agent can read it in `/proc/self/mountinfo`: a count would show how many agents were started.

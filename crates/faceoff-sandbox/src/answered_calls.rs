@@ -1,4 +1,5 @@
-//! System calls of agents that the service answers in place of the kernel (*user notification* of seccomp).
+//! System calls of agents that the *service*, the process that starts agents, answers in place of the kernel (*user notification* of
+//! seccomp).
 //!
 //! - `statfs`, `fstatfs` and `sysinfo` show counters of the whole host, which an upload, a visitor or another agent moves. They cannot
 //!   fail: C libraries do not check `sysinfo`, and old ones find `/dev/shm` by `statfs`. So every agent gets the same figures at any
@@ -84,7 +85,7 @@ pub(crate) struct CallHandlerSetup {
 }
 
 impl CallFilter {
-    /// Both sides for one agent.
+    /// The child's and the service's side for one agent.
     pub(crate) fn new(spec: &SpawnSpec) -> Result<(Self, CallHandlerSetup), SandboxError> {
         let (socket, child_socket) = socketpair(
             AddressFamily::UNIX,
@@ -122,6 +123,7 @@ impl CallFilter {
         }
         sendmsg(
             &self.child_socket,
+            // A descriptor is sent along with at least one byte, which has no meaning.
             &[IoSlice::new(b"l")],
             &mut message,
             SendFlags::empty(),
@@ -215,8 +217,8 @@ struct EmulatedValues {
     has_namespaces: bool,
 }
 
-/// The answer of `statfs` and `fstatfs`: an empty file system of so many blocks. On 64-bit machines the fields of the kernel's structure are
-/// 64-bit integers in this order; the last four are unused.
+/// The answer of `statfs` and `fstatfs`: an empty file system of so many blocks. On 64-bit machines the fields of the kernel's structure
+/// are 64-bit integers in this order; the last four are unused.
 const fn statfs_fields(blocks: u64) -> [u64; 15] {
     let (size, free, available) = (blocks, blocks, blocks);
     let (files, free_files) = (FREE_FILES, FREE_FILES);
@@ -240,8 +242,8 @@ const fn statfs_fields(blocks: u64) -> [u64; 15] {
     ]
 }
 
-/// The answer of `sysinfo`: the host's figures before the first agent started, and the agent's memory. On 64-bit machines that put the lower
-/// byte first, the fields of the kernel's structure and their padding are these integers.
+/// The answer of `sysinfo`: the host's figures before the first agent started, and the agent's memory. On 64-bit machines that put the
+/// lower byte first, the fields of the kernel's structure and their padding are these integers.
 fn sysinfo_fields(memory: MemoryView) -> [u64; 14] {
     static HOST: OnceLock<Sysinfo> = OnceLock::new();
     let host = HOST.get_or_init(sysinfo);
@@ -316,7 +318,7 @@ struct CallHandler<'a> {
 impl CallHandler<'_> {
     /// Answers until the last process with the filter has ended.
     fn answer_calls(&mut self) {
-        let mut last_answer = Duration::ZERO;
+        let mut last_answer_cpu_time = Duration::ZERO;
         loop {
             let events = {
                 let mut fds = [PollFd::new(self.listener, PollFlags::IN)];
@@ -331,23 +333,23 @@ impl CallHandler<'_> {
             }
             let cpu_time_before = own_cpu_time();
             if cpu_time_before > UNTHROTTLED_CPU_TIME {
-                std::thread::sleep(PAUSE.max(last_answer * PAUSE_PER_CPU_TIME));
+                std::thread::sleep(PAUSE.max(last_answer_cpu_time * PAUSE_PER_CPU_TIME));
             }
             self.retry_locks();
             if is_asked && !self.answer_next() {
                 return;
             }
-            last_answer = own_cpu_time().saturating_sub(cpu_time_before);
+            last_answer_cpu_time = own_cpu_time().saturating_sub(cpu_time_before);
         }
     }
 
     /// `None` if no lock is waited for.
     fn time_until_retry(&self) -> Option<Timespec> {
-        let left = self
+        let time_left = self
             .locks
             .next_try_at()?
             .saturating_duration_since(Instant::now());
-        Timespec::try_from(left).ok()
+        Timespec::try_from(time_left).ok()
     }
 
     fn retry_locks(&mut self) {
@@ -399,11 +401,11 @@ impl CallHandler<'_> {
         let caller = Caller {
             listener: self.listener.as_fd(),
             id: call.id,
-            thread: call.pid,
+            host_thread: call.pid,
         };
         let [first, second, third, ..] = call.data.args;
         // The lower half of an argument, as the kernel takes it for an `int`.
-        let int = |argument: u64| argument as i32;
+        let as_int = |argument: u64| argument as i32;
         match i64::from(call.data.nr) {
             libc::SYS_statfs | libc::SYS_fstatfs => {
                 write_figures(caller, second, &self.values.statfs_fields)
@@ -411,8 +413,8 @@ impl CallHandler<'_> {
             libc::SYS_sysinfo => write_figures(caller, first, &self.values.sysinfo_fields),
             libc::SYS_setsid if self.sessions.take(Instant::now()) => Ok(Reply::Execute),
             libc::SYS_setsid => Ok(Reply::Failed(Errno::PERM)),
-            libc::SYS_socket if int(first) == libc::AF_NETLINK => {
-                let kind = int(second);
+            libc::SYS_socket if as_int(first) == libc::AF_NETLINK => {
+                let kind = as_int(second);
                 let socket = route_sockets::make(caller, kind & libc::SOCK_NONBLOCK != 0)?;
                 Ok(Reply::File {
                     file: socket,
@@ -431,25 +433,26 @@ impl CallHandler<'_> {
             }),
             libc::SYS_flock => {
                 let has_own_files = self.values.has_namespaces;
-                let outcome = self
-                    .locks
-                    .lock(caller, int(first), int(second), has_own_files)?;
+                let outcome =
+                    self.locks
+                        .lock(caller, as_int(first), as_int(second), has_own_files)?;
                 Ok(outcome.into())
             }
-            libc::SYS_sched_getaffinity => self.affinity(caller, int(first), second, third),
-            libc::SYS_sched_setaffinity => self.set_affinity(caller, int(first), second, third),
+            libc::SYS_sched_getaffinity => self.affinity(caller, as_int(first), second, third),
+            libc::SYS_sched_setaffinity => self.set_affinity(caller, as_int(first), second, third),
             _ => Ok(Reply::Failed(Errno::NOSYS)),
         }
     }
 
+    /// Answers `sched_getaffinity` for the thread that the agent names `number`.
     fn affinity(
         &self,
         caller: Caller<'_>,
-        thread: i32,
+        number: i32,
         bytes: u64,
         address: u64,
     ) -> io::Result<Reply> {
-        let Some(thread) = caller.thread(thread)? else {
+        let Some(thread) = caller.thread(number)? else {
             return Ok(Reply::Failed(Errno::SRCH));
         };
         let mask = self
@@ -463,6 +466,7 @@ impl CallHandler<'_> {
         Ok(Reply::Value(mask.len() as i64))
     }
 
+    /// Executes `sched_setaffinity` for the thread that the agent names `number`.
     fn set_affinity(
         &self,
         caller: Caller<'_>,
@@ -480,11 +484,11 @@ impl CallHandler<'_> {
         if set.count() == 0 {
             return Ok(Reply::Failed(Errno::INVAL));
         }
-        let before = sched_getaffinity(Some(thread))?;
+        let affinity_before = sched_getaffinity(Some(thread))?;
         sched_setaffinity(Some(thread), &set)?;
         if caller.thread(number)? != Some(thread) {
             // It ended meanwhile, and another process may have its number.
-            let _ = sched_setaffinity(Some(thread), &before);
+            let _ = sched_setaffinity(Some(thread), &affinity_before);
             return Ok(Reply::Failed(Errno::SRCH));
         }
         Ok(Reply::Value(0))

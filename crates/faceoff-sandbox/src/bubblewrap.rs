@@ -73,8 +73,8 @@ const INIT: &str = "/proc/1";
 /// Terminals, whose number all agents share.
 const TERMINALS: &str = "/dev/pts";
 
-/// Counters of the host that ordinary libraries read. Agents see snapshots that were taken before the first agent started, because
-/// the live counters would show what other agents do (e.g. the number of started processes). The snapshots show the agent's CPUs and memory.
+/// Counters of the host that ordinary libraries read. Agents see snapshots that were taken before the first agent started, because the
+/// live counters would show what other agents do (e.g. the number of started processes). The snapshots show the agent's CPUs and memory.
 const SNAPSHOT_NAMES: [&str; 5] = ["stat", "cpuinfo", "meminfo", "loadavg", "uptime"];
 
 /// An installed bubblewrap and its features.
@@ -105,19 +105,20 @@ impl Bubblewrap {
         }))
     }
 
-    /// The command line for `spec`, with the file descriptors and mounts that the child needs. `private_mounts` must be `true` if
-    /// bubblewrap runs as a user that may be unable to reach the files by path.
+    /// The command line for `spec`, with the file descriptors and mounts that the child needs. `as_other_user`:
+    /// bubblewrap runs as another user than this process, who may be unable to reach the files by path or to make a network. Then the
+    /// child makes mounts and the network before it becomes that user.
     pub(crate) fn command(
         &self,
         spec: &SpawnSpec,
         status: OwnedFd,
         filters: Option<&Filters>,
-        private_mounts: bool,
+        as_other_user: bool,
     ) -> Result<Invocation, SandboxError> {
         let mut line = CommandLine {
             args: Vec::new(),
             inherited_fds: Vec::new(),
-            mounts: private_mounts.then(PrivateMounts::new),
+            mounts: as_other_user.then(PrivateMounts::new),
         };
         line.args([
             "--unshare-user",
@@ -125,7 +126,7 @@ impl Bubblewrap {
             "--unshare-pid",
             "--unshare-uts",
         ]);
-        let network = if private_mounts {
+        let network = if as_other_user {
             Some(PrivateNetwork::new()?)
         } else {
             line.args(["--unshare-net"]);

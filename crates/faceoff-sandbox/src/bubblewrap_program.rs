@@ -23,13 +23,13 @@ const NEEDED_OPTIONS: [&str; 4] = [
     "--json-status-fd",
 ];
 
-/// A usable program.
+/// A usable `bwrap` of the host.
 #[derive(Debug, Clone)]
 pub(crate) struct BubblewrapProgram {
     pub path: PathBuf,
     /// Version line, e.g. `bubblewrap 0.8.0`.
     pub version: String,
-    /// Its description of its options.
+    /// What it prints for `--help`.
     pub help: String,
 }
 

@@ -8,8 +8,8 @@ use std::{
     os::fd::{AsFd, AsRawFd, FromRawFd, OwnedFd},
 };
 
-/// Installs a filter in the calling process and returns its listener. With `WAIT_KILLABLE_RECV` (Linux 5.19) a call that this service has
-/// received is not repeated because of a signal.
+/// Installs a filter in the calling process and returns its listener. With `WAIT_KILLABLE_RECV` (Linux 5.19) a call that the answering
+/// process has received is not repeated because of a signal.
 pub(crate) fn install_with_listener(program: &BpfProgram) -> Result<OwnedFd, Errno> {
     const NEW_LISTENER: libc::c_ulong = 1 << 3;
     const WAIT_KILLABLE_RECV: libc::c_ulong = 1 << 5;
@@ -84,8 +84,8 @@ pub(crate) fn send_file(
             0
         },
     };
-    // Linux 5.14 could do both in one step. Only `SIGKILL` ends the caller's wait in between, or any signal before 5.19: then it repeats its
-    // call, and has one descriptor more.
+    // Linux 5.14 could do both in one step. Only `SIGKILL` ends the caller's wait in between, or any signal before 5.19: then it repeats
+    // its call, and has one descriptor more.
     let number = control(&listener, NOTIF_ADDFD, (&raw mut request).cast())?;
     send_reply(listener, id, Ok(number.into()))
 }

@@ -1,4 +1,4 @@
-//! The thread whose system call the service answers: its memory, its process, its files and its network.
+//! The agent's thread whose system call this process answers in place of the kernel: its memory, its process, its files and its network.
 //!
 //! A thread may be killed while its call is answered, and its number given to another. So each function first opens what it needs by the
 //! number, and then asks the listener whether the call still waits.
@@ -25,7 +25,7 @@ pub(crate) struct Caller<'a> {
     /// Number of the call.
     pub id: u64,
     /// Number of the thread on the host.
-    pub thread: u32,
+    pub host_thread: u32,
 }
 
 impl Caller<'_> {
@@ -64,7 +64,7 @@ impl Caller<'_> {
     /// A descriptor of the thread (Linux 6.9), or of its process, whose first thread may have ended.
     fn pidfd(self) -> io::Result<OwnedFd> {
         const THREAD: PidfdFlags = PidfdFlags::from_bits_retain(libc::PIDFD_THREAD);
-        if let Some(thread) = Pid::from_raw(self.thread.cast_signed())
+        if let Some(thread) = Pid::from_raw(self.host_thread.cast_signed())
             && let Ok(found) = pidfd_open(thread, THREAD)
         {
             return Ok(found);
@@ -94,7 +94,7 @@ impl Caller<'_> {
     pub(crate) fn thread(self, number: i32) -> io::Result<Option<Pid>> {
         if number == 0 {
             check_waiting(self.listener, self.id)?;
-            return Ok(Pid::from_raw(self.thread.cast_signed()));
+            return Ok(Pid::from_raw(self.host_thread.cast_signed()));
         }
         let own_namespace = fs::read_link(self.path("ns/pid"))?;
         let own_threads = numbered_entries(self.path("task"))?;
@@ -122,7 +122,7 @@ impl Caller<'_> {
     }
 
     fn path(self, name: &str) -> PathBuf {
-        PathBuf::from(format!("/proc/{}/{name}", self.thread))
+        PathBuf::from(format!("/proc/{}/{name}", self.host_thread))
     }
 }
 

@@ -1,5 +1,5 @@
-//! The channel between service and agent: questions (lines to its standard input), answers (lines from its standard output), and its
-//! log (standard error).
+//! The channel between the *service* (the process that starts agents) and an agent: questions (lines to its standard input), answers
+//! (lines from its standard output), and its log (standard error).
 //!
 //! Questions and answers pass through stream sockets, never pipes. A pipe has a single lock, held by the thread that is inside a call
 //! on it. An agent can stay inside a call as long as it likes: in a `splice` from an empty socket, or in a `write`

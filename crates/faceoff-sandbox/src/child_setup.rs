@@ -1,4 +1,4 @@
-//! Set-up of the child process between fork and exec: cgroup, CPUs, mounts, limits, user and filters.
+//! Set-up of an agent's process, a child of the *service*, between fork and exec: cgroup, CPUs, mounts, limits, user and filters.
 
 use crate::{
     Limits, agent_user::AgentUser, answered_calls::CallFilter, private_mounts::PrivateMounts,

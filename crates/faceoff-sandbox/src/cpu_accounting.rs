@@ -24,9 +24,10 @@ use std::{
 /// Maximum lag of the counters behind the true run time: the kernel charges a running thread at its next tick, at least 100 times a second.
 const MAX_COUNTER_LAG: Duration = Duration::from_millis(10);
 
-/// Counters read right before a question (a message to the agent that expects an answer). Reading them takes a few microseconds.
+/// Counters read right before a question (a message to the agent that expects an answer). Later readings are compared with them.
+/// Reading them takes a few microseconds.
 #[derive(Debug, Clone)]
-pub struct Baseline {
+pub struct CounterBaseline {
     /// When the counters were read.
     pub read_at: Instant,
     /// Counters of the agent's CPUs, without the states of its threads. `None` without a cgroup, or if the kernel
@@ -115,7 +116,7 @@ impl CpuSamples {
 }
 
 impl CpuAccounting {
-    /// Reads the counters as the start of a span; `None` if the host has none.
+    /// Reads all counters as the start of a span; `None` if the host has none.
     pub(crate) fn read_start(&self, threads: &TrackedThreads) -> Option<CpuReading> {
         self.read(ReadOrder::AgentFirst, threads)
     }
@@ -164,10 +165,10 @@ impl CpuAccounting {
         // between the baseline and the question did not delay the answer. Both are subtracted.
         let since_baseline = baseline.map(|baseline| {
             let baseline_age = asked_at.saturating_duration_since(baseline.read_at);
-            let ran = estimator
+            let others_time = estimator
                 .others_time(baseline, &now)
                 .saturating_sub(MAX_COUNTER_LAG + baseline_age);
-            ran.max(
+            others_time.max(
                 estimator
                     .run_delay(baseline, &now)
                     .saturating_sub(baseline_age),

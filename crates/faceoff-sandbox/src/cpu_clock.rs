@@ -1,4 +1,5 @@
-//! CPU time by the clocks of processes and threads. That of a process tree is used without a cgroup, and where the cgroup's counter lags behind.
+//! CPU time by the clocks of processes and threads. That of a process tree is used without a cgroup, and where the cgroup's counter lags
+//! behind.
 
 use rustix::{
     process::Pid,
@@ -10,6 +11,7 @@ use std::{cell::RefCell, collections::BTreeMap, fs, time::Duration};
 /// its last reading, and processes that started and ended between two readings.
 #[derive(Debug)]
 pub(crate) struct TreeClock {
+    /// The process at the top of the tree.
     root: Pid,
     time_ns_by_pid: RefCell<BTreeMap<i32, u64>>,
 }

@@ -1,4 +1,4 @@
-//! Parsers of the kernel's counters of CPU time.
+//! Parsers of the kernel's counters of CPU time: files of cgroups and `/proc/stat`.
 
 use std::{fs::File, os::unix::fs::FileExt, time::Duration};
 

@@ -1,7 +1,8 @@
 //! Numbers of an agent's CPUs: the agent counts from 0, whatever their numbers on the host are.
 //!
-//! Programs that pin their threads begin with CPU 0, which an agent beside others may not use. So the service answers the system calls that
-//! read and change affinities ([`crate::answered_calls`]), and files list the same numbers ([`crate::cpu_view`]).
+//! Programs that pin their threads begin with CPU 0, which an agent beside others may not use. So this process answers, in place of the
+//! kernel, the system calls that read and change affinities ([`crate::answered_calls`]), and files list the same numbers
+//! ([`crate::cpu_view`]).
 
 use crate::{Layer, SpawnSpec, affinity};
 use rustix::thread::CpuSet;
@@ -16,11 +17,13 @@ pub(crate) struct CpuNumbers {
 }
 
 impl CpuNumbers {
-    /// The CPUs of `spec`: its own, or those of this process. Without the filter that passes calls to the service, they keep their numbers.
+    /// The CPUs of `spec`: its own, or those of this process. Without the filter that passes calls to this process, they keep their
+    /// numbers.
     pub(crate) fn new(spec: &SpawnSpec) -> Self {
         Self::of(&spec.cpus, spec.isolation.enforces(Layer::Seccomp))
     }
 
+    /// `is_filtered`: does the filter pass calls about affinities to this process?
     pub(crate) fn of(cpus: &[usize], is_filtered: bool) -> Self {
         let mut host = match cpus {
             // A host that does not report its CPUs has at least one.

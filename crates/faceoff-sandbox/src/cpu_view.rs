@@ -26,6 +26,7 @@ pub(crate) const THREAD_VARIABLES: [&str; 6] = [
 #[derive(Debug)]
 pub(crate) struct CpuView {
     numbers: CpuNumbers,
+    /// Number of threads that numerical libraries should start.
     threads: usize,
 }
 
@@ -34,7 +35,7 @@ impl CpuView {
         Self::of(CpuNumbers::new(spec), spec.limits.cpus)
     }
 
-    /// `quota`: CPU time that the agent may use, in CPUs.
+    /// `quota`: CPU time per time that the agent may use, in CPUs, e.g. 1.5.
     fn of(numbers: CpuNumbers, quota: f64) -> Self {
         let quota = quota.ceil().max(1.0) as usize;
         Self {

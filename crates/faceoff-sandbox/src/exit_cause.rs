@@ -1,4 +1,4 @@
-//! Why an agent's process tree ended: agent fault, platform fault, or killed by the service.
+//! Why an agent's process tree ended: agent fault, platform fault, or killed by this process on purpose.
 
 use crate::{Limits, cgroup::ExceededLimit};
 use faceoff_types::AgentFaultKind;
@@ -11,7 +11,7 @@ pub(crate) enum ExitCause {
     Agent(AgentFaultKind),
     /// The sandbox failed; the text says how.
     Platform(String),
-    /// The service killed it.
+    /// This process killed it on purpose.
     Killed,
 }
 

@@ -1,5 +1,5 @@
-//! Refuses file descriptors that an agent sends through the socket of its output. The service has no use for them, and closing one
-//! could take long.
+//! Refuses file descriptors that an agent sends through the socket of its output. The evaluator has no use for them, and closing
+//! one could take long.
 
 use std::os::fd::{AsRawFd, BorrowedFd};
 
@@ -41,14 +41,14 @@ mod tests {
 
     #[test]
     fn sent_descriptor_is_refused_if_the_kernel_can() {
-        let (service_end, agent_end) = socketpair(
+        let (own_end, agent_end) = socketpair(
             AddressFamily::UNIX,
             SocketType::STREAM,
             SocketFlags::CLOEXEC,
             None,
         )
         .unwrap();
-        disable(service_end.as_fd());
+        disable(own_end.as_fd());
         let files = [agent_end.as_fd()];
         let mut space = [MaybeUninit::uninit(); rustix::cmsg_space!(ScmRights(1))];
         let mut passed = SendAncillaryBuffer::new(&mut space);

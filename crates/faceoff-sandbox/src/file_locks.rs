@@ -1,7 +1,7 @@
 //! Locks of whole files (`flock`), which an agent may take on files of its own only.
 //!
 //! A lock on a file that other agents see, too, is a channel between them: each could find whether it is locked. The filter sees the number
-//! of a descriptor but not its file. So the service takes the lock for the agent: it fetches a further descriptor of the same open file,
+//! of a descriptor but not its file. So this process takes the lock for the agent: it fetches a further descriptor of the same open file,
 //! to which a lock belongs, looks at the file, and locks that descriptor. The agent cannot exchange the file in between.
 
 use crate::{call_listener::check_waiting, caller::Caller};
@@ -17,7 +17,7 @@ use std::{
 
 /// Folders whose file systems are an agent's own.
 const OWN_FOLDERS: [&str; 2] = ["/tmp", "/dev/shm"];
-/// Locks for which an agent's threads may wait at once: each takes a descriptor of the service.
+/// Locks for which an agent's threads may wait at once: each takes a descriptor of this process.
 const MAX_WAITING: usize = 32;
 /// Pause before a lock that is taken is tried again; it doubles with each attempt.
 const FIRST_PAUSE: Duration = Duration::from_millis(1);
@@ -38,7 +38,7 @@ struct WaitingLock {
     next_try_at: Instant,
 }
 
-/// What a call that locks comes to.
+/// The outcome of a call of `flock`.
 #[derive(Debug)]
 pub(crate) enum LockOutcome {
     /// The call has succeeded.

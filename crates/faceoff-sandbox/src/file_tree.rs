@@ -1,4 +1,4 @@
-//! Copies of files and folders in memory.
+//! Copies of files and folders in a file system in memory, and the size of such copies.
 
 use rustix::fs::{AtFlags, CWD, Timespec, Timestamps, utimensat};
 use std::{
@@ -9,7 +9,8 @@ use std::{
 
 /// Memory is allocated in pages of this size.
 const PAGE_BYTES: u64 = 4096;
-/// Adds the size of the files below `path`, in memory; stops once the sum exceeds `limit_bytes`.
+
+/// Adds the size that copies of the files below `path` would have in memory to `bytes`. Stops once the sum exceeds `limit_bytes`.
 pub(crate) fn add_size(path: &Path, limit_bytes: u64, bytes: &mut u64) -> io::Result<()> {
     let Some(meta) = readable(fs::symlink_metadata(path))? else {
         return Ok(());

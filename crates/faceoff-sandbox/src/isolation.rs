@@ -56,7 +56,7 @@ impl fmt::Display for Layer {
 pub enum Isolation {
     /// All layers except the disabled ones.
     Sandboxed {
-        /// Layers that the organiser has disabled (`given_up` in the configuration). Empty: all layers are enforced.
+        /// Layers that the organiser has disabled (`sandbox.given_up` in the configuration). Empty: all layers are enforced.
         disabled_layers: Vec<Layer>,
     },
     /// A developer's own agent: no namespaces, no seccomp, no cgroup, no resource limits, and the caller's

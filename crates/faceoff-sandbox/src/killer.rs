@@ -8,7 +8,7 @@ use std::{os::fd::OwnedFd, path::PathBuf};
 /// the [`crate::AgentProcess`] still reaps the tree.
 #[derive(Debug)]
 pub struct Killer {
-    /// Pidfds of the sandbox's first process, whose end terminates all others in it, and of the service's child.
+    /// Pidfds of the sandbox's first process, whose end terminates all others in it, and of the child of this process.
     pub(crate) processes: Vec<OwnedFd>,
     pub(crate) cgroups: Vec<PathBuf>,
 }

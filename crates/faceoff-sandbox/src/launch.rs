@@ -32,7 +32,7 @@ use std::{
 /// Time limit for bubblewrap's set-up of a sandbox. Exceeding it is a platform fault.
 const SET_UP_TIMEOUT: Duration = Duration::from_secs(120);
 
-/// A running process tree, and the service's ends of its channel.
+/// A running process tree, and this process's ends of its channel.
 pub(crate) struct LaunchedAgent {
     pub lines: LineSocket,
     /// Name of the agent's output in `/proc/*/fd`.
@@ -48,8 +48,10 @@ pub(crate) struct Launch {
     /// Answers some of the agent's system calls.
     call_handler: Option<CallHandlerSetup>,
     channel: Channel,
+    /// Reports from bubblewrap; `None` without it.
     status: Option<StatusPipe>,
     cgroup: Option<AgentCgroup>,
+    /// The agent's scratch folder on the host; `None` if the sandbox has its own, or there is no sandbox.
     scratch: Option<tempfile::TempDir>,
 }
 
@@ -78,7 +80,8 @@ impl Launch {
         let (filters, call_filter, call_handler) = if enforces(Layer::Seccomp) {
             let (filter, call_handler) = CallFilter::new(spec)?;
             let has_own_network = enforces(Layer::Namespaces);
-            let filters = Filters::build(has_own_network, !spec.cpus.is_empty() && !is_confined)?;
+            let refuse_affinity_changes = !spec.cpus.is_empty() && !is_confined;
+            let filters = Filters::build(has_own_network, refuse_affinity_changes)?;
             (Some(filters), Some(filter), Some(call_handler))
         } else {
             (None, None, None)
@@ -139,6 +142,7 @@ impl Launch {
         })
     }
 
+    /// A developer's own agent, without any layer.
     fn unsandboxed(spec: &SpawnSpec) -> Result<Self, SandboxError> {
         let mut command = direct_command(spec);
         command.envs(&spec.env);
@@ -178,6 +182,7 @@ impl Launch {
         command.process_group(0);
         if spec.logs_output {
             setup.protocol = Some(ProtocolDescriptors::new(&questions, &answers)?);
+            // The agent's standard output goes to its log, too; it gets the protocol by other descriptors.
             let stdout = stderr
                 .try_clone()
                 .context("cannot pass the agent its log")?;

@@ -3,7 +3,7 @@
 //! An organiser can disable each layer by name ([`Isolation`]); no layer is skipped silently. The layers:
 //! bubblewrap (namespaces, read-only files, no capabilities), a seccomp filter, cgroup limits on
 //! memory, processes and CPU time (v1 and v2, also side by side), and resource limits.
-//! When the service is root, an agent never is: it gets a user id of its own.
+//! When the process that uses this crate (in messages: the *service*) is root, an agent never is: it gets a user id of its own.
 //!
 //! This crate does not parse an agent's output and does not decide a verdict. It never turns a platform
 //! fault into an agent fault or the other way round
@@ -32,16 +32,16 @@ mod exit_cause;
 mod fd_passing;
 mod file_locks;
 mod file_tree;
-mod fixes;
 mod isolation;
 mod killer;
 mod launch;
+mod layer_advice;
 mod line_socket;
 mod memory_image;
 mod memory_view;
 mod open_output;
+mod output_check_schedule;
 mod owner;
-mod poll_interval;
 mod private_mounts;
 mod private_network;
 mod probe;
@@ -64,7 +64,7 @@ mod thread_waits;
 
 pub use bounded_log::BoundedLog;
 pub use bubblewrap::HOSTS;
-pub use cpu_accounting::{Baseline, CpuReading, CpuSamples, HostInterference};
+pub use cpu_accounting::{CounterBaseline, CpuReading, CpuSamples, HostInterference};
 pub use error::{SandboxError, SpawnError, WriteError};
 pub use evaluator_counters::EvaluatorCounters;
 pub use faceoff_types::ResourceLimits as Limits;

@@ -46,7 +46,7 @@ pub enum ReadLine {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Closed;
 
-/// The service's ends of the agent's input and output.
+/// The evaluator's ends of the agent's input and output.
 #[derive(Debug)]
 pub(crate) struct LineSocket {
     input: OwnedFd,
@@ -285,7 +285,7 @@ mod tests {
     use super::*;
     use std::{io::Write as _, os::unix::net::UnixStream, thread, time::Duration};
 
-    /// The service's ends, and the agent's end of its output.
+    /// The evaluator's ends, and the agent's end of its output.
     fn line_socket() -> (LineSocket, UnixStream) {
         let (_agents_input, input) = UnixStream::pair().unwrap();
         let (output, agents_output) = UnixStream::pair().unwrap();

@@ -1,4 +1,4 @@
-//! A copy of the runtimes' files in memory, which closes a covert channel between agents.
+//! A copy of the runtimes' files in memory, which closes a covert channel between agents. It has nothing to do with container images.
 //!
 //! Agents share these files. On a disk, an agent leaves traces in the kernel's caches: the pages that it read and
 //! the names that it looked up. Another agent can find them by timing its own accesses. In a file system in memory,

@@ -12,7 +12,7 @@ const CONSTANTS: [&str; 2] = ["Hugepagesize", "VmallocTotal"];
 /// The memory of one agent.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct MemoryView {
-    /// In bytes; `None` if the host does not limit it.
+    /// In bytes; `None` if no limit is enforced.
     limit: Option<u64>,
 }
 

@@ -10,8 +10,8 @@ use std::{fs, io};
 /// more descriptors counts as still having its output open.
 const MAX_DESCRIPTORS: usize = 4096;
 
-/// Does a process of `tree` other than `helpers` (bubblewrap's) have a descriptor that `/proc` names `output`? Also `true` if this is unknown;
-/// then the service waits until the deadline of the answer.
+/// Does a process of `tree` other than `helpers` (bubblewrap's) have a descriptor that `/proc` names `output`? Also `true` if this is
+/// unknown; then the evaluator waits until the deadline of the answer.
 pub(crate) fn is_open_in_tree(
     output: &str,
     tree: &[Pid],

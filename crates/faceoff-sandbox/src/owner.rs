@@ -1,5 +1,5 @@
-//! The owner of resources that outlive a process (cgroups, folders): the service process that created them. It is part of their
-//! names.
+//! The owner of resources that outlive a process (cgroups, folders): the process of Faceoff that created them, here called *service*. It
+//! is part of their names.
 
 use std::fs;
 

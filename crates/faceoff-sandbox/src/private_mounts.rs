@@ -1,9 +1,9 @@
 //! Makes files reachable for an agent's user that cannot reach them by path, and gives the agent files of its own where several agents
 //! would share the host's.
 //!
-//! A root service keeps bundles in a folder closed to other users. bubblewrap runs as the agent's user and
-//! looks its sources up by path. So the child, while it is still root, mounts them below `/tmp` of a
-//! private mount namespace. No other process sees these mounts, and they end with the namespace.
+//! If the process that starts agents (the *service*) is root, it keeps bundles in a folder closed to other users. bubblewrap runs as the
+//! agent's user and looks its sources up by path. So the child, while it is still root, mounts them below `/tmp` of a private mount
+//! namespace. No other process sees these mounts, and they end with the namespace.
 
 use crate::{SandboxError, agent_user::AgentUser, error::IoContext, file_tree};
 use rustix::{
@@ -47,7 +47,7 @@ const DEVICES: [(&CStr, &CStr, u32, u32); 6] = [
 #[derive(Debug)]
 pub(crate) struct PrivateMounts {
     sources: Vec<Source>,
-    /// May this service make device nodes?
+    /// May this process make device nodes?
     can_make_device_nodes: bool,
 }
 

@@ -2,7 +2,8 @@
 
 use crate::{
     AgentProcess, Isolation, Layer, Limits, ReadLine, Runtime, SandboxError, SpawnError, SpawnSpec,
-    answered_calls, bubblewrap::Bubblewrap, bubblewrap_program::BubblewrapProgram, fixes::fix,
+    answered_calls, bubblewrap::Bubblewrap, bubblewrap_program::BubblewrapProgram,
+    layer_advice::fix,
 };
 use serde::Serialize;
 use std::{

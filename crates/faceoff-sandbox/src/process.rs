@@ -1,8 +1,8 @@
 //! A running agent: questions and answers, measurements of its CPUs, and its end.
 
 use crate::{
-    AnswerState, Baseline, CpuReading, CpuSamples, EvaluatorCounters, HostInterference, Isolation,
-    Killer, Limits, ReadLine, SandboxError, SpawnError, SpawnSpec, WriteError,
+    AnswerState, CounterBaseline, CpuReading, CpuSamples, EvaluatorCounters, HostInterference,
+    Isolation, Killer, Limits, ReadLine, SandboxError, SpawnError, SpawnSpec, WriteError,
     cgroup::AgentCgroup,
     command_check::check_command,
     error::IoContext,
@@ -10,7 +10,7 @@ use crate::{
     launch::{Launch, LaunchedAgent},
     line_socket::{Closed, LineSocket, wait_for_any},
     open_output,
-    poll_interval::PollInterval,
+    output_check_schedule::OutputCheckSchedule,
     process_tree::ProcessTree,
     status_pipe::StatusPipe,
     stderr_log::StderrLog,
@@ -38,7 +38,7 @@ pub struct AgentProcess {
     tree: ProcessTree,
     limits: Limits,
     /// When to check next whether the agent has closed its output.
-    output_poll: PollInterval,
+    output_checks: OutputCheckSchedule,
     /// The threads whose scheduling counters are read.
     threads: TrackedThreads,
     is_frozen: bool,
@@ -101,7 +101,7 @@ impl AgentProcess {
             stderr,
             tree,
             limits: spec.limits,
-            output_poll: PollInterval::start(Instant::now()),
+            output_checks: OutputCheckSchedule::start(Instant::now()),
             threads: TrackedThreads::default(),
             is_frozen: false,
             start_hint,
@@ -119,7 +119,7 @@ impl AgentProcess {
         let sent_at = Instant::now();
         match self.lines.send(line) {
             Ok(Ok(())) => {
-                self.output_poll = PollInterval::start(sent_at);
+                self.output_checks = OutputCheckSchedule::start(sent_at);
                 Ok(())
             }
             Ok(Err(Closed)) => {
@@ -186,7 +186,7 @@ impl AgentProcess {
             if self.output_is_abandoned()? {
                 break ReadLine::Closed;
             }
-            self.output_poll.lengthen(Instant::now());
+            self.output_checks.lengthen(Instant::now());
         };
         if matches!(answer, ReadLine::Closed) {
             self.diagnose_end(EXIT_TIMEOUT)?;
@@ -231,7 +231,7 @@ impl AgentProcess {
     /// needed.
     fn next_poll_or_deadline(&self, deadline: Instant) -> Instant {
         if self.tree.is_sandboxed() {
-            deadline.min(self.output_poll.next_check_at)
+            deadline.min(self.output_checks.next_check_at)
         } else {
             deadline
         }
@@ -293,7 +293,7 @@ impl AgentProcess {
 
     /// Reads the counters before a question. `evaluator_cpus`: the CPUs of the calling thread (the evaluator's) if they are disjoint from
     /// the agent's; then its counters are included.
-    pub fn read_baseline(&self, evaluator_cpus: Option<&[usize]>) -> Baseline {
+    pub fn read_baseline(&self, evaluator_cpus: Option<&[usize]>) -> CounterBaseline {
         let cgroup = self.tree.cgroup.as_ref();
         let accounting = cgroup.and_then(|cgroup| cgroup.cpu_accounting.as_ref());
         let stat = if accounting.is_some() || evaluator_cpus.is_some() {
@@ -301,7 +301,7 @@ impl AgentProcess {
         } else {
             String::new()
         };
-        Baseline {
+        CounterBaseline {
             read_at: Instant::now(),
             cpus: accounting.and_then(|accounting| accounting.read_baseline(&self.threads, &stat)),
             evaluator: evaluator_cpus

@@ -25,18 +25,19 @@ pub struct ReplayableGame {
     pub origin: GameOrigin,
     /// Whether the game has ended.
     pub is_over: bool,
-    /// The game before the current rally.
+    /// The game's rally number, steps, score and violations when the current rally began.
     pub rally_start: GameProgress,
     /// Actions of both robots in the current rally, as passed by the caller, step by step; those of a robot that is not
     /// commanded are NaN.
     pub actions: Vec<f64>,
     /// Last commanded joint positions, rad.
     commanded: [[f64; JOINTS]; 2],
+    /// The simulated arms.
     plant: Arc<Plant>,
 }
 
 impl ReplayableGame {
-    /// A game at its start. The arms of `previous` are used if they are the same.
+    /// A game at its start. Drawing the arms takes milliseconds, so those of `previous` are reused if the new ones would be the same.
     pub fn start(settings: &GameSettings, origin: GameOrigin, previous: Option<&Self>) -> Self {
         let plant = match previous {
             Some(previous) if settings.shares_plant(previous.origin.seed, origin.seed) => {
@@ -88,6 +89,7 @@ impl ReplayableGame {
             .simulation
             .step([0, 1].map(|robot| match &commands[robot] {
                 Some(command) => Command::Act(command),
+                // As for an answer that is too late: the arm holds its position.
                 None => Command::Late,
             }));
         if step.rally_end.is_some() {
@@ -103,7 +105,7 @@ impl ReplayableGame {
     /// Plays a rally again from its start.
     ///
     /// # Errors
-    /// If the actions are not those of a rally that goes on.
+    /// If an action is invalid, or the actions end the rally: a snapshot is never taken at a rally's end.
     pub fn replay(
         settings: &GameSettings,
         origin: GameOrigin,

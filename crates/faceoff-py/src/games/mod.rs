@@ -20,7 +20,7 @@ use game::{GameOrigin, ReplayableGame};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use rayon::prelude::*;
-use rows::{GameRow, GameRows, flatten, games_with_rows};
+use rows::{GameArrays, GameRow, flatten, games_with_rows};
 use settings::GameSettings;
 use std::sync::Arc;
 
@@ -29,6 +29,7 @@ use std::sync::Arc;
 pub struct Games {
     settings: Arc<GameSettings>,
     autoreset: Autoreset,
+    /// Number of games.
     count: usize,
     pool: Pool,
     state: State,
@@ -59,14 +60,14 @@ impl Games {
         })
     }
 
-    /// Starts the games of the mask: number 0 of their seed, or without a seed the one after the last. Rows of other
-    /// games are not written.
+    /// Starts the games for which `mask` is true: number 0 of their seed, or, without a seed, the one after their last game. Rows of
+    /// other games are not written.
     fn reset(
         slf: &Bound<'_, Self>,
         py: Python<'_>,
         mask: PyReadonlyArray1<'_, bool>,
         seeds: Vec<Option<u64>>,
-        mut rows: GameRows<'_>,
+        mut rows: GameArrays<'_>,
     ) -> PyResult<()> {
         let this = &mut *borrow_mut(slf)?;
         let mut rows = rows.rows(this.count)?;
@@ -124,14 +125,14 @@ impl Games {
         slf: &Bound<'_, Self>,
         py: Python<'_>,
         actions: [Option<PyReadonlyArray2<'_, f64>>; 2],
-        mut rows: GameRows<'_>,
+        mut rows: GameArrays<'_>,
     ) -> PyResult<()> {
         let this = &mut *borrow_mut(slf)?;
         let mut rows = rows.rows(this.count)?;
-        let mut slices: [Option<&[f64]>; 2] = [None, None];
+        let mut actions_by_robot: [Option<&[f64]>; 2] = [None, None];
         for (robot, array) in actions.iter().enumerate() {
             if let Some(array) = array {
-                slices[robot] = Some(this.check_actions(robot, array)?);
+                actions_by_robot[robot] = Some(this.check_actions(robot, array)?);
             }
         }
         let lens = this.settings.action_formats().map(|format| format.len());
@@ -140,11 +141,11 @@ impl Games {
         let games = this.state.open_games()?;
         check_call_order(games, autoreset)?;
         let step = |index: usize, game: &mut ReplayableGame, row: &mut GameRow<'_>| {
-            let own = [0, 1].map(|robot: usize| {
+            let game_actions = [0, 1].map(|robot: usize| {
                 let len = lens[robot];
-                slices[robot].map(|actions| &actions[index * len..][..len])
+                actions_by_robot[robot].map(|actions| &actions[index * len..][..len])
             });
-            step_one(settings, autoreset, game, own, row);
+            step_one(settings, autoreset, game, game_actions, row);
         };
         // A panic leaves games in the middle of a step, so all of them become unusable.
         let stepped = py.detach(|| {
@@ -179,12 +180,12 @@ impl Games {
     }
 
     /// Restores a state that was saved in an environment with the same settings, and writes the game's row. Before the
-    /// first reset, games are restored in order.
+    /// first reset there are no games yet: then they are restored one after another, from index 0 on.
     fn restore(
         slf: &Bound<'_, Self>,
         index: usize,
         snapshot: &Bound<'_, GameSnapshot>,
-        mut rows: GameRows<'_>,
+        mut rows: GameArrays<'_>,
     ) -> PyResult<()> {
         let this = &mut *borrow_mut(slf)?;
         let snapshot = snapshot.get();

@@ -23,16 +23,17 @@ pub const GAME_STATE_LEN: usize = 6 + 2 * (2 * JOINTS + 3);
 
 const OBSERVATIONS_LEN: usize = 2 * OBSERVATION_WITH_OPPONENT_LEN;
 
-/// Arrays with two rows per game, robot 1 first (observations and final observations), or with one (facts, true states).
+/// The arrays, allocated by the Python half: observations, final observations, facts, true states. The first two have two rows per
+/// game, robot 1 first; the others have one.
 #[derive(FromPyObject)]
-pub struct GameRows<'py>(
+pub struct GameArrays<'py>(
     PyReadwriteArray2<'py, f32>,
     PyReadwriteArray2<'py, f32>,
     PyReadwriteArray2<'py, f64>,
     PyReadwriteArray2<'py, f64>,
 );
 
-/// The row of a game.
+/// The part of each array that belongs to one game.
 pub struct GameRow<'a> {
     observations: &'a mut [f32],
     final_observations: &'a mut [f32],
@@ -40,14 +41,14 @@ pub struct GameRow<'a> {
     state: &'a mut [f64],
 }
 
-impl GameRows<'_> {
+impl GameArrays<'_> {
     /// The rows of `games` games.
     ///
     /// # Errors
     /// If an array has another shape or is not contiguous.
     pub fn rows(&mut self, games: usize) -> PyResult<Vec<GameRow<'_>>> {
         let Self(observations, finals, facts, states) = self;
-        let check = |name, shape: &[usize], rows, width| {
+        let check_shape = |name, shape: &[usize], rows, width| {
             if shape == [rows, width] {
                 return Ok(());
             }
@@ -59,10 +60,10 @@ impl GameRows<'_> {
             ))
         };
         let width = OBSERVATION_WITH_OPPONENT_LEN;
-        check("observations", observations.shape(), 2 * games, width)?;
-        check("final observations", finals.shape(), 2 * games, width)?;
-        check("facts", facts.shape(), games, GAME_FACTS)?;
-        check("states", states.shape(), games, GAME_STATE_LEN)?;
+        check_shape("observations", observations.shape(), 2 * games, width)?;
+        check_shape("final observations", finals.shape(), 2 * games, width)?;
+        check_shape("facts", facts.shape(), games, GAME_FACTS)?;
+        check_shape("states", states.shape(), games, GAME_STATE_LEN)?;
         let observations = observations
             .as_slice_mut()?
             .chunks_exact_mut(OBSERVATIONS_LEN);

@@ -46,7 +46,7 @@ impl GameSettings {
         })
     }
 
-    /// Whether games with this seed and `other` have the same arms.
+    /// Whether games with the seeds `seed` and `other` have the same arms.
     pub fn shares_plant(&self, seed: u64, other: u64) -> bool {
         seed == other || self.mismatch_seed.is_some()
     }

@@ -32,14 +32,16 @@ struct SavedGame {
     faceoff: String,
     settings: GameSettings,
     seed: u64,
+    /// The game's number among those of its seed.
     number: u32,
     is_over: bool,
+    /// Number, control steps of the game, goals, fouls and serving robot at the start of the current rally.
     rally: u32,
     steps: u32,
     goals: [u32; 2],
     fouls: [u32; 2],
     serving_robot: usize,
-    /// Of each robot: ee, link, joint_pos, joint_vel.
+    /// Whether each robot had violated the constraints ee, link, joint_pos, joint_vel at that time.
     violations: [[bool; 4]; 2],
     /// `None` is a number of a robot that was not commanded.
     actions: Vec<Option<f64>>,

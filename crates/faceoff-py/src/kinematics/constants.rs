@@ -1,6 +1,7 @@
 //! The arm's lengths and bounds, from the simulator's model, and the parameters of the inverses.
 //!
-//! The parameters have the names and values of the Python package's `kinematics/plain.py`; a test compares them.
+//! The parameters have the names and values of `kinematics/plain.py` in the Python package, which computes the same without NumPy and
+//! this crate; a test compares them.
 
 use super::pose::kinematics_at;
 use faceoff_sim::{
@@ -25,7 +26,8 @@ pub const ITERATIONS: usize = 100;
 pub const STEP_LIMIT_RAD: f64 = 0.3;
 /// Added to the diagonal of the normal equations of the least squares, so that they always have a solution.
 pub const DAMPING: f64 = 1e-6;
-/// Decrease of the hand's angle from straight up per metre of reach. The *hand* is the part from joint 6 to the end effector.
+/// Decrease of the hand's angle from straight up per metre of *reach*, the distance from joint 1's axis. The *hand* is the part from
+/// joint 6 to the end effector.
 pub const HAND_PER_REACH_RAD_M: f64 = 0.85;
 /// The hand's angle from straight up in the start pose.
 pub const START_HAND_RAD: f64 = INITIAL_Q[1] - INITIAL_Q[3] + INITIAL_Q[5];

@@ -9,11 +9,11 @@ use std::array::from_fn;
 
 /// Joint positions, rad, near `start` that put the end effector at a point, m; the last iterate if there is no solution.
 pub fn solve_near(arm: &Arm, point: Vec3<f64>, start: &[f64; JOINTS]) -> [f64; JOINTS] {
-    let within = |joint: usize, angle: f64| {
+    let clamped = |joint: usize, angle: f64| {
         let bound = arm.bound_rad[joint];
         angle.clamp(-bound, bound)
     };
-    let mut q = from_fn(|joint| within(joint, start[joint]));
+    let mut q = from_fn(|joint| clamped(joint, start[joint]));
     for _ in 0..ITERATIONS {
         let kinematics = kinematics_at(&q);
         let wrist = kinematics.links[JOINTS - 1].origin;
@@ -43,9 +43,9 @@ pub fn solve_near(arm: &Arm, point: Vec3<f64>, start: &[f64; JOINTS]) -> [f64; J
             });
             step = linearisation.step(&unblocked_weight);
         }
-        let length = inner(&step, &step).sqrt();
+        let length = inner_product(&step, &step).sqrt();
         let step_fraction = (STEP_LIMIT_RAD / length.max(1e-300)).min(1.0);
-        q = from_fn(|joint| within(joint, q[joint] + step_fraction * step[joint]));
+        q = from_fn(|joint| clamped(joint, q[joint] + step_fraction * step[joint]));
     }
     q
 }
@@ -69,18 +69,19 @@ impl Linearisation {
         if self.deficit <= 0.0 {
             return step;
         }
-        let desired: [f64; JOINTS] = from_fn(|joint| weight[joint] * self.rise[joint]);
+        let raising_change: [f64; JOINTS] = from_fn(|joint| weight[joint] * self.rise[joint]);
         let end_effector_shift = self
             .columns
             .iter()
-            .zip(desired)
-            .fold(Vec3::zero(), |sum, (column, desired)| {
-                sum + column.scale(desired)
+            .zip(raising_change)
+            .fold(Vec3::zero(), |sum, (column, change)| {
+                sum + column.scale(change)
             });
         let compensation = least_change(&self.columns, end_effector_shift, weight);
         let null_space_change: [f64; JOINTS] =
-            from_fn(|joint| desired[joint] - compensation[joint]);
-        let null_space_fraction = self.deficit / inner(&self.rise, &null_space_change).max(1e-3);
+            from_fn(|joint| raising_change[joint] - compensation[joint]);
+        let null_space_fraction =
+            self.deficit / inner_product(&self.rise, &null_space_change).max(1e-3);
         from_fn(|joint| step[joint] + null_space_fraction * null_space_change[joint])
     }
 }
@@ -102,11 +103,12 @@ pub fn least_change(
     }
     // The inverse of a symmetric matrix by its rows' vector products.
     let (bc, ca, ab) = (b.cross(c), c.cross(a), a.cross(b));
-    let force =
+    // (J W Jᵀ + λ I)⁻¹ d
+    let multiplier =
         (bc.scale(desired.x) + ca.scale(desired.y) + ab.scale(desired.z)).scale(1.0 / a.dot(bc));
-    from_fn(|joint| weight[joint] * columns[joint].dot(force))
+    from_fn(|joint| weight[joint] * columns[joint].dot(multiplier))
 }
 
-fn inner(a: &[f64; JOINTS], b: &[f64; JOINTS]) -> f64 {
+fn inner_product(a: &[f64; JOINTS], b: &[f64; JOINTS]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

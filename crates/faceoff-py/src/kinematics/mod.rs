@@ -1,7 +1,7 @@
 //! The arm's kinematics for batches of poses, in the robot's base frame, for `faceoff.kinematics.native`.
 //!
-//! Forward kinematics are the simulator's functions. The inverses are those of the package's `kinematics/plain.py`,
-//! which explains them. The Python half checks arguments and allocates the arrays, all of them contiguous. The
+//! Forward kinematics are the simulator's functions. The inverses are those of the package's `kinematics/plain.py`
+//! (Python without NumPy), which explains them. The Python half checks arguments and allocates the arrays, all of them contiguous. The
 //! platform's mathematics are not used: the same arguments give the same bits on every machine, alone or in a batch.
 
 mod arrays;
@@ -159,7 +159,7 @@ pub fn arm_constraints(
     map_row_pairs(py, (&q, &dq), &mut values, constraints)
 }
 
-/// The constants that `kinematics/plain.py` has, too, under the same names; a test compares them.
+/// The constants that `kinematics/plain.py` (Python without NumPy) has, too, under the same names; a test compares them.
 #[pyfunction]
 pub fn arm_constants(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let dict = PyDict::new(py);

@@ -7,8 +7,8 @@ use faceoff_sim::{
 };
 use std::array::from_fn;
 
-/// The kinematics at a pose, rad, with the universal joint at zero. Inlining lets the compiler drop unused results, a
-/// third of the time of `arm_forward`.
+/// The kinematics at a pose, rad, with the universal joint (between arm and mallet) at zero. Inlining lets the compiler drop unused
+/// results, a third of the time of `arm_forward`.
 #[inline(always)]
 pub fn kinematics_at(q: &[f64; JOINTS]) -> Kinematics<f64> {
     Kinematics::new(&with_zero_universal(q))

@@ -1,6 +1,6 @@
 //! Inverse kinematics in closed form. The *posture* of a point is the one pose (joint angles) that reaches it with the arm in
 //! a vertical plane and the elbow up. The arm in that plane is a chain of upper arm, forearm and hand (from joint 6 to the end
-//! effector).
+//! effector). The variables `upper`, `forearm` and `hand` are their angles from straight up.
 
 use super::constants::{
     Arm, FOREARM_M, HAND_M, HAND_PER_REACH_RAD_M, SHOULDER_M, START_HAND_RAD, UPPER_ARM_M,
@@ -17,9 +17,10 @@ pub fn posture(arm: &Arm, [x, y, z]: [f64; 3]) -> [f64; JOINTS] {
     let ahead = reach - HAND_M * sin_hand;
     let above = z - HAND_M * cos_hand - SHOULDER_M;
     // Shoulder, elbow and wrist are a triangle of known sides.
-    let side = libm::hypot(ahead, above);
-    let elbow = triangle_angle(side, UPPER_ARM_M, FOREARM_M);
-    let upper = libm::atan2(ahead, above) - triangle_angle(FOREARM_M, UPPER_ARM_M, side.max(1e-9));
+    let shoulder_to_wrist = libm::hypot(ahead, above);
+    let elbow = triangle_angle(shoulder_to_wrist, UPPER_ARM_M, FOREARM_M);
+    let upper = libm::atan2(ahead, above)
+        - triangle_angle(FOREARM_M, UPPER_ARM_M, shoulder_to_wrist.max(1e-9));
     let forearm = upper + PI - elbow;
     [
         libm::atan2(y, x),

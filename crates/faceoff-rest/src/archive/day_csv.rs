@@ -25,6 +25,7 @@ pub(super) fn day_table(competition: &Competition, evaluations: &[EvaluationView
     let mut table = table_with_tasks(competition, &columns, &score_columns);
     let no_tasks = Default::default();
     for evaluation in evaluations {
+        // States have their names in the API, some of which differ from those here.
         let (state, finished_at) = match &evaluation.status {
             EvaluationStatus::Queued => ("queued", None),
             EvaluationStatus::Running => ("running", None),

@@ -65,7 +65,7 @@ pub(crate) const fn store_edition(edition: Edition) -> faceoff_store::Edition {
 /// Collects the contents of an archive and their hashes.
 ///
 /// # Errors
-/// `StorageFull`; `Conflict` if an organiser's archive is requested from a public one.
+/// `StorageFull`; `Conflict` if the organiser's edition is requested from a server that shows an imported public archive.
 pub(crate) async fn collect(app: &App, edition: Edition) -> Result<PreparedArchive, Problem> {
     free_space::check(app)?;
     let folder = tempfile::Builder::new()
@@ -157,7 +157,8 @@ pub(crate) async fn collect(app: &App, edition: Edition) -> Result<PreparedArchi
     })
 }
 
-/// The summaries of runs that have none, because they have just ended or the season was imported without.
+/// The episode summaries of runs (all episodes of one agent) that have none stored: runs that have just ended, or of a season that was
+/// imported without.
 async fn missing_summaries(app: &App) -> Result<MissingSummaries, Problem> {
     let version = EpisodeSummary::VERSION;
     let mut json_by_run = Vec::new();

@@ -42,7 +42,7 @@ pub(super) struct ArtifactRow {
 }
 
 impl ArtifactRow {
-    /// An artifact other than the dataset of an evaluation.
+    /// An artifact other than the dataset of an evaluation, only in the organiser's edition. Its line names no team, stage or day.
     pub(super) fn without_team(
         kind: &'static str,
         id: impl ToString,
@@ -217,8 +217,8 @@ async fn day_datasets(
 ) -> Result<Vec<ArtifactRow>, Problem> {
     let mut datasets = Vec::new();
     for evaluation in app.store.evaluations_of_day(stage_day).await? {
-        let public = visibility.is_public(&evaluation);
-        if !public && viewer != Viewer::Organiser || evaluation.dataset_removed.is_some() {
+        let is_public = visibility.is_public(&evaluation);
+        if !is_public && viewer != Viewer::Organiser || evaluation.dataset_removed.is_some() {
             continue;
         }
         let EvaluationState::Finished {
@@ -237,7 +237,7 @@ async fn day_datasets(
             team: app.store.team(evaluation.team).await?.name.to_string(),
             stage: stage.name.to_string(),
             day: stage_day.date.to_string(),
-            public,
+            public: is_public,
         });
     }
     Ok(datasets)

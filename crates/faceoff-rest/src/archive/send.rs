@@ -19,7 +19,7 @@ const MAX_BUFFERED_CHUNKS: usize = 4;
 pub(crate) fn send(prepared: PreparedArchive, permit: OwnedSemaphorePermit) -> Body {
     let (chunks, received) = mpsc::channel(MAX_BUFFERED_CHUNKS);
     tokio::task::spawn_blocking(move || {
-        // The next archive may begin once the files of this one are removed.
+        // Variables are dropped in reverse order: the permit for the next archive comes back after the files of this one are removed.
         let (_permit, prepared) = (permit, prepared);
         let mut sink = ChunkWriter {
             chunks: chunks.clone(),

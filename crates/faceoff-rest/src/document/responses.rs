@@ -2,7 +2,7 @@
 //! security; a route itself describes only its specific responses.
 
 use super::{
-    files::{self, inline_parameters},
+    conditional_requests::{self, inline_parameters},
     lists,
 };
 use axum::http::StatusCode;
@@ -199,8 +199,8 @@ pub(super) fn complete(document: &mut openapi::OpenApi) {
 }
 
 fn complete_operation(method: HttpMethod, operation: &mut Operation) {
-    files::complete(operation);
-    lists::complete(operation);
+    conditional_requests::complete(operation);
+    paged_lists::complete(operation);
     let traits = OperationTraits {
         method,
         operation: &*operation,

@@ -128,9 +128,10 @@ impl<'a> Budget<'a> {
         Err(self.fail(BundleError::Invalid(reason)))
     }
 
-    /// Checks all limits; called before each piece of work.
+    /// Checks for an earlier failure, cancellation, the time, and the read bytes; called before each piece of work.
     pub(super) fn check(&self) -> Result<(), BundleError> {
         if self.failure.borrow().is_some() {
+            // Any error will do: the stored failure replaces it.
             return Err(BundleError::Cancelled);
         }
         if (self.cancelled)() {

@@ -10,8 +10,8 @@ use std::{
     path::Path,
 };
 
-/// Mode of all folders. It is set explicitly, whatever the service's umask: if the service is root, agents run as other users, who must
-/// be able to read them.
+/// Mode of all folders. It is set explicitly, whatever this process's umask: if this process is root, agents run as other users, who
+/// must be able to read them.
 pub(super) const FOLDER_MODE: u32 = 0o755;
 /// Longest path in an archive, in bytes; together with the target folder it must stay below the system's 4096.
 pub(super) const PATH_MAX_BYTES: usize = 1024;

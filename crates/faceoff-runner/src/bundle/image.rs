@@ -70,7 +70,7 @@ pub(super) fn unpack<'a>(
             archive.remove(&layer.name)?;
         }
     }
-    archive.clear()?;
+    archive.remove_rest()?;
     let agent = root.finish(manifest)?;
     Ok((
         Image {

@@ -1,4 +1,4 @@
-//! Symbolic links of a bundle must not lead out of it. Links are followed in memory, before any is created.
+//! The check that symbolic links of a bundle do not lead out of it. They are followed in memory, before any is created.
 
 use super::{error::BundleError, node::Node};
 use std::collections::BTreeMap;

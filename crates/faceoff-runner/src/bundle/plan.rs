@@ -15,6 +15,7 @@ pub(super) struct Plan {
     max_files: u64,
     /// Number of files and links so far.
     files: u64,
+    /// Number of folders so far.
     folders: u64,
 }
 
@@ -36,7 +37,7 @@ impl Plan {
         self.nodes
     }
 
-    /// Adds a folder that has its own entry.
+    /// Adds a folder that has its own entry. `entry` is here and below the name in the archive, for messages.
     pub fn add_folder(&mut self, entry: &str) -> Result<(), BundleError> {
         let path = normalise(entry)?;
         if path.is_empty() {

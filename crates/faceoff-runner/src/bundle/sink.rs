@@ -4,7 +4,7 @@ use super::error::BundleError;
 use std::io::Read;
 
 /// Receives the entries of an archive.
-pub(super) trait Sink {
+pub(super) trait EntrySink {
     /// A folder. Its mode is not kept.
     fn add_folder(&mut self, entry: &str) -> Result<(), BundleError>;
     /// A file, its content streamed.

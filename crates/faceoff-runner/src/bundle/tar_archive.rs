@@ -4,7 +4,7 @@ use super::{
     budget::{Budget, MeteredReader},
     entry::unusable,
     error::BundleError,
-    sink::{FileAttributes, Sink, Special},
+    sink::{EntrySink, FileAttributes, Special},
 };
 use std::io::{self, Read};
 use tar::{Archive, EntryType, Header};
@@ -30,7 +30,7 @@ struct Extensions {
 /// archive's end are not read.
 pub(super) fn unpack<'a>(
     reader: impl Read,
-    sink: &mut impl Sink,
+    sink: &mut impl EntrySink,
     budget: &'a Budget<'a>,
 ) -> Result<(), BundleError> {
     let mut archive = Archive::new(MeteredReader::new(reader, budget));

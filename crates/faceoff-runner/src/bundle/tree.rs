@@ -10,7 +10,7 @@ use super::{
     links,
     node::Node,
     plan::Plan,
-    sink::{FileAttributes, Sink, Special},
+    sink::{EntrySink, FileAttributes, Special},
 };
 use fs_err::{self as fs, os::unix::fs::symlink};
 use std::{
@@ -149,7 +149,7 @@ impl<'a> Tree<'a> {
     }
 }
 
-impl Sink for Tree<'_> {
+impl EntrySink for Tree<'_> {
     /// The folder is created by [`Tree::finish`], or with the first file in it.
     fn add_folder(&mut self, entry: &str) -> Result<(), BundleError> {
         if is_system_file(entry) {

@@ -5,7 +5,7 @@ use super::{
     entry::{invalid, is_named_like_metadata, is_system_file, unusable},
     error::BundleError,
     plan::Plan,
-    sink::{FileAttributes, Sink},
+    sink::{EntrySink, FileAttributes},
     tree::Tree,
 };
 use std::{

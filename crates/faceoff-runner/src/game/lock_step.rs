@@ -229,7 +229,7 @@ fn missing_freezer_error() -> SandboxError {
     }
 }
 
-/// Checks one side for its answer. Diagnosing the exit of an agent may take seconds, which must not count for the
+/// Checks without waiting whether one side has answered. Diagnosing the exit of an agent may take seconds, which must not count for the
 /// other side.
 fn poll_side(polled: &mut SidePlayer<'_>, other: &mut SidePlayer<'_>) -> Result<(), PlatformFault> {
     let started_at = Instant::now();

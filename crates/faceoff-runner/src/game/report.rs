@@ -30,8 +30,8 @@ pub trait GameObserver {
     fn on_step(&mut self, _row: &GameStepRow<'_>) {}
     /// A rally is over.
     fn on_rally_end(&mut self, _row: &RallyRow<'_>) {}
-    /// The end of an agent's standard error with its faults. Called exactly once for each side, even if there is no
-    /// report because the game was cancelled or the platform failed.
+    /// An agent's standard error (its beginning and end, if it is long), with its faults. Called exactly once for each side, even if
+    /// there is no report because the game was cancelled or the platform failed.
     fn log(&mut self, _side: Side, _log: &str) {}
     /// Should the game stop? Called after each start and before each step, so it must be cheap.
     fn cancelled(&self) -> bool;
@@ -44,7 +44,7 @@ pub struct GameReport {
     pub archives: GameArchives,
     /// Timing noise of the worker's slot, measured on the CPUs of each side.
     pub calibration: GameCalibration,
-    /// The ends of both agents' standard error, with their faults.
+    /// Both agents' standard error (its beginning and end, if it is long), with their faults.
     pub logs: [String; 2],
 }
 
@@ -135,7 +135,7 @@ pub fn play_game<S: GameSink>(
 ) -> Result<(FinishedGame<S>, GameCalibration, [String; 2]), PlatformFault> {
     let [first, second] = envs;
     let agent_cpus = [&first.agent_cpus[..], &second.agent_cpus].concat();
-    let _pinned = AffinityGuard::avoid(&agent_cpus);
+    let _affinity_guard = AffinityGuard::avoid(&agent_cpus);
     let mut calibrations = [
         Calibration::start(&first.agent_cpus)?,
         Calibration::start(&second.agent_cpus)?,

@@ -279,6 +279,7 @@ impl<'a> SidePlayer<'a> {
         }
     }
 
+    /// Sends `bye` to the agent, if it runs, and logs its standard error.
     pub fn finish(&mut self) -> Result<(), PlatformFault> {
         if let Some(session) = self.session.take() {
             let stderr = session.finish()?;

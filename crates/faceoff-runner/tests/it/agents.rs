@@ -8,7 +8,8 @@ use std::{collections::BTreeMap, fs, os::unix::fs::PermissionsExt};
 use tempfile::TempDir;
 
 /// A complete agent that keeps its initial pose, with hooks for misbehaviour: `on_hello(hello)`, `on_reset(episode)` and
-/// `on_step(step, answer)`, which returns the line to send, or `None` for no answer.
+/// `on_step(step, answer)`, which returns the line to send, or `None` for no answer. They
+/// replace `#HOOKS`.
 const AGENT_TEMPLATE: &str = r#"
 import json, os, sys, time
 INTERPOLATION = 3

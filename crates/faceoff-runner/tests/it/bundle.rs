@@ -113,6 +113,7 @@ fn invalid_manifest_refusal_says_why() {
 
 #[test]
 fn files_added_by_operating_systems_are_left_out() {
+    // The first bytes of an AppleDouble file, in which macOS keeps metadata of another file.
     let metadata = b"\0\x05\x16\x07";
     // A zip of macOS's Finder, of a folder in which a Windows computer has left settings, too.
     let finder = zip(&[
@@ -153,6 +154,7 @@ fn files_added_by_operating_systems_are_left_out() {
 
 #[test]
 fn own_files_named_like_metadata_are_unpacked() {
+    // Named like AppleDouble files of macOS, but without their first bytes (00 05 16 07).
     let files: [(&str, u32, &[u8]); 3] = [
         ("agent.toml", 0o644, MANIFEST.as_bytes()),
         ("._weights", 0o644, b"\0\x05\x16\x08 and more"),
@@ -392,6 +394,7 @@ fn long_names_of_gnu_and_pax_are_read() {
     let (_dir, bundle) = unpack_valid(&gnu.gz());
     assert_eq!(fs::read(bundle.dir.join(&name)).unwrap(), b"gnu");
 
+    // A record begins with its own length, here of three digits.
     let record = format!(" path={name}\n");
     let record = format!("{}{record}", record.len() + 3);
     let pax = Tar::with_manifest()
@@ -674,6 +677,7 @@ fn damaged_archives_are_refused_as_invalid() {
     ]);
     assert_refused(&zipped[..zipped.len() / 2], "the archive is damaged");
     let mut flipped = zip(&[("agent.toml", 0o644, MANIFEST.as_bytes())]);
+    // A byte of the file's compressed content.
     flipped[50] ^= 0xff;
     let (_dir, result) = try_unpack(&flipped, BundleLimits::default());
     assert!(matches!(result, Err(BundleError::Invalid(_))), "{result:?}");

@@ -1,4 +1,5 @@
-//! CPU time that an agent uses without a pending question counts as its time, or is prevented by freezing.
+//! CPU time that an agent uses between its answer and the next question (*early* CPU time) counts as its time, or is prevented by
+//! freezing the agent.
 
 use crate::{
     agents::{Agent, sandboxed_environment},

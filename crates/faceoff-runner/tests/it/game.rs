@@ -206,6 +206,7 @@ fn late_answers_are_dropped_and_cost_only_their_side() {
     assert!(late.faults.is_empty());
     assert_eq!((other.late_answers, other.answers), (0, 60));
     let [late, other] = &report.archives.score.sides;
+    // Late answers of one window (500 control steps) are one violation.
     assert_eq!(late.violations.get(ViolationName::COMPUTATION_TIME), 1);
     assert!(late.computation_time_s.max > 2.0);
     assert!(other.computation_time_s.max < 2.0);
@@ -257,7 +258,7 @@ fn silent_side_holds_its_arm_and_is_restarted_next_rally() {
         ]
     );
     assert_eq!(report.archives.outcome.rallies, 2);
-    // Each window with a fault is penalised.
+    // Each window (500 control steps) with a fault is penalised with two points.
     let score = &report.archives.score.sides[1];
     assert_eq!(score.violations.get(ViolationName::COMPUTATION_TIME), 2);
     assert_eq!(score.penalty_points, 4.0);
@@ -344,6 +345,7 @@ fn repeated_faults_forfeit_the_game() {
         }
     );
     assert_eq!(score.winner.map(|side| side as u32), Some(0));
+    // By the default rule `ForfeitScore::Ten`.
     assert_eq!([score.sides[0].score, score.sides[1].score], [10, 0]);
     assert_eq!(score.sides[1].forfeit, Some(cause));
     assert!(report.logs[0].ends_with("goodbye\n"), "{}", report.logs[0]);
@@ -392,7 +394,7 @@ fn used_up_game_time_forfeits_the_game() {
 /// A closed output of a running agent is diagnosed only after a wait of the evaluator, which must not count as the
 /// other side's time.
 #[test]
-fn diagnosis_of_one_side_is_not_on_the_others_clock() {
+fn diagnosis_of_one_side_costs_the_other_no_time() {
     let closing = Agent::with_hooks(
         "def on_step(step, answer):\n    \
          if step == 2: os.close(1); time.sleep(3600)\n    \

@@ -39,7 +39,8 @@ impl InterferenceMonitor for FixedShare {
     }
 }
 
-/// Sets the maximum reruns per episode, and per 100 episodes.
+/// Sets the maximum reruns per episode, and per 100 episodes. A rerun repeats an episode that host interference ended; the column
+/// `host_noise_reruns` counts them.
 fn with_reruns(mut env: AgentEnvironment, per_episode: u32, per_100: u32) -> AgentEnvironment {
     env.time.host_interference_reruns = per_episode;
     env.time.host_interference_reruns_per_100 = per_100;
@@ -88,7 +89,7 @@ fn sleeping_agent_is_not_excused() {
 }
 
 #[test]
-fn late_answer_counts_without_host_interference() {
+fn host_interference_is_subtracted_from_a_late_answer() {
     let out = tempfile::tempdir().unwrap();
     let env = with_reruns(sandboxed_environment(), 2, 100);
     let agent = Agent::with_hooks(SLEEPING_HOOKS);
@@ -152,23 +153,31 @@ fn episode_ended_by_the_host_is_rerun_by_a_new_process() {
     assert_eq!(ints(&episodes, "episode").values(), &[0, 1]);
 
     // Same seed, same bits, as without the interruption.
-    let plain = out.path().join("plain");
-    let undisturbed = run(&spec, &Agent::behaving(), &sandboxed_environment(), &plain).unwrap();
+    let undisturbed_dir = out.path().join("undisturbed");
+    let undisturbed = run(
+        &spec,
+        &Agent::behaving(),
+        &sandboxed_environment(),
+        &undisturbed_dir,
+    )
+    .unwrap();
     assert_eq!(
         without_times(&report.outcomes),
         without_times(&undisturbed.outcomes)
     );
-    let [rerun, plain] = [dir, plain].map(|dir| read_table(&dir.join("steps.parquet")));
+    let [rerun, undisturbed] =
+        [dir, undisturbed_dir].map(|dir| read_table(&dir.join("steps.parquet")));
     for name in ["obs_puck_x", "puck_x", "ee_z", "constraint_ee"] {
-        assert_eq!(floats(&rerun, name), floats(&plain, name), "{name}");
+        assert_eq!(floats(&rerun, name), floats(&undisturbed, name), "{name}");
     }
-    assert_eq!(ints(&rerun, "step"), ints(&plain, "step"));
+    assert_eq!(ints(&rerun, "step"), ints(&undisturbed, "step"));
 }
 
 #[test]
 fn reruns_are_bounded_and_the_last_try_counts() {
     let out = tempfile::tempdir().unwrap();
-    // Maximum reruns per episode and per 100 episodes, and the reruns of each of three episodes.
+    // Maximum reruns per episode and per 100 episodes (for the three episodes here 3/100 of it, rounded up), and the reruns of each
+    // episode.
     for (per_episode, per_100, expected) in
         [(0, 100, [0, 0, 0]), (2, 100, [2, 1, 0]), (2, 5, [1, 0, 0])]
     {
@@ -204,7 +213,7 @@ fn reruns_are_bounded_and_the_last_try_counts() {
 }
 
 #[test]
-fn hard_limit_is_extended_only_by_host_interference() {
+fn step_limit_is_extended_only_by_host_interference() {
     let out = tempfile::tempdir().unwrap();
     let late = "def on_step(step, answer):\n    \
         if step == 1: time.sleep(1.5)\n    \
@@ -333,14 +342,15 @@ fn event_storms_of_the_agent_are_not_host_interference() {
         assert_eq!(report.outcomes[0].fault, None, "{name}");
         assert_eq!(report.timing.host_interference_reruns, 0, "{name}");
         let steps = read_table(&out.path().join("steps.parquet"));
-        let [host, counted, cpu] = ["host_time_ns", "computation_time_ns", "cpu_time_ns"]
+        let [host, counted, cpu_time] = ["host_time_ns", "computation_time_ns", "cpu_time_ns"]
             .map(|name| seconds(&steps, name));
-        for storm in (5..50).step_by(5).take_while(|step| *step < host.len()) {
-            assert!(host[storm] + counted[storm] >= 0.15, "{name}: step {storm}");
+        // The steps with a storm.
+        for step in (5..50).step_by(5).take_while(|step| *step < host.len()) {
+            assert!(host[step] + counted[step] >= 0.15, "{name}: step {step}");
         }
         // Independent check: interference cannot exceed the run time of other processes on this CPU.
         if let (Some(before_s), Some(after_s)) = (before_s, after_s) {
-            let others_s = after_s - before_s - cpu.iter().sum::<f64>();
+            let others_s = after_s - before_s - cpu_time.iter().sum::<f64>();
             let interference_s: f64 = host.iter().sum();
             // Ticks of the steal time are rounded down.
             assert!(
@@ -420,16 +430,16 @@ fn other_load_on_the_agents_cpu_is_measured() {
     drop(busy_loops);
     report.unwrap();
     let steps = read_table(&out.path().join("steps.parquet"));
-    let [host, counted, cpu] =
+    let [host, counted, cpu_time] =
         ["host_time_ns", "computation_time_ns", "cpu_time_ns"].map(|name| seconds(&steps, name));
-    if cpu[1] == 0.0 || host.iter().all(|time| *time == 0.0) {
-        panic!("no interference was measured: {host:?} {counted:?} {cpu:?}");
+    if cpu_time[1] == 0.0 || host.iter().all(|time| *time == 0.0) {
+        panic!("no interference was measured: {host:?} {counted:?} {cpu_time:?}");
     }
     for step in 1..6 {
         // The kernel's counters lag by a tick.
         assert!(
-            counted[step] + 0.02 >= cpu[step],
-            "{step}: {counted:?} {cpu:?}"
+            counted[step] + 0.02 >= cpu_time[step],
+            "{step}: {counted:?} {cpu_time:?}"
         );
     }
 }
@@ -489,6 +499,7 @@ fn waits_of_helpers_do_not_excuse_a_sleeping_agent() {
     }
 }
 
+/// The noise floor is the delay that the host adds to the answers of a test agent which answers at once.
 #[test]
 fn noise_floor_is_measured_before_and_between_episodes() {
     let out = tempfile::tempdir().unwrap();
@@ -501,8 +512,9 @@ fn noise_floor_is_measured_before_and_between_episodes() {
     .unwrap();
     let timing = report.timing;
     assert_eq!((timing.before_s.count, timing.during_s.count), (200, 20));
-    for trips in [timing.before_s, timing.during_s] {
-        assert!(trips.p50 > 0.0 && trips.p50 <= trips.p99 && trips.p99 <= trips.max);
+    for round_trips in [timing.before_s, timing.during_s] {
+        assert!(round_trips.p50 > 0.0 && round_trips.p50 <= round_trips.p99);
+        assert!(round_trips.p99 <= round_trips.max);
     }
 }
 

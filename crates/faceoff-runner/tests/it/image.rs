@@ -202,6 +202,8 @@ fn sandbox_files_exist_and_sandbox_folders_are_empty() {
     );
 }
 
+/// A whiteout, the empty file `.wh.NAME` of a layer, removes NAME of the layers below. `.wh..wh..opq` removes everything of them in
+/// its folder.
 #[test]
 fn whiteouts_hide_only_lower_layers() {
     let (_dir, image) = unpack_layers([
@@ -584,9 +586,9 @@ fn agent_folder_and_manifest_must_not_be_links() {
 
 #[test]
 fn runtime_must_match_the_bundle() {
-    let plain = Tar::new().file("agent/agent.toml", 0o644, MANIFEST.as_bytes());
+    let python_agent = Tar::new().file("agent/agent.toml", 0o644, MANIFEST.as_bytes());
     assert_refusal_is(
-        &TestImage::new([plain]).docker().bytes(),
+        &TestImage::new([python_agent]).docker().bytes(),
         "agent.toml: runtime is \"python3\", and the bundle is a container image, which brings its own: expected \
          \"image\"",
     );
@@ -629,10 +631,10 @@ fn archive_must_hold_one_image() {
     let one = TestImage::agent([]);
     let entry = json!({"Config": "config.json", "Layers": ["layer0/layer.tar"]});
     let other = json!({"Config": "other.json", "Layers": ["layer0/layer.tar"]});
-    let docker = |list_of: &serde_json::Value| {
+    let docker = |images: &serde_json::Value| {
         let layer = &one.packed_layers()[0];
         Tar::new()
-            .file("manifest.json", 0o644, &json_bytes(list_of))
+            .file("manifest.json", 0o644, &json_bytes(images))
             .file("config.json", 0o644, &one.config_bytes())
             .file("layer0/layer.tar", 0o644, layer)
             .bytes()
@@ -688,6 +690,7 @@ fn image_of_the_hosts_platform_is_chosen() {
         "platform": platform("unknown", "unknown"),
         "annotations": {"vnd.docker.reference.type": "attestation-manifest"},
     });
+    // An OCI layout whose index names another list, which has these images.
     let nested = |tar: Tar, images: serde_json::Value| {
         let inner = json_bytes(&json!({"schemaVersion": 2, "manifests": images}));
         let name = digest(&inner);
@@ -724,7 +727,7 @@ fn image_of_the_hosts_platform_is_chosen() {
     let (tar, mut for_host) = host_image.blobs(tar);
     riscv["platform"] = platform("riscv64", "linux");
     for_host["platform"] = platform(host, "linux");
-    let names = |image: &TestImage| {
+    let docker_list = |image: &TestImage| {
         let blob = |bytes: &[u8]| format!("blobs/{}", digest(bytes).replace(':', "/"));
         let layers: Vec<String> = image
             .packed_layers()
@@ -733,9 +736,11 @@ fn image_of_the_hosts_platform_is_chosen() {
             .collect();
         json_bytes(&json!([{"Config": blob(&image.config_bytes()), "Layers": layers}]))
     };
+    // Docker's list has only the image for riscv64, and the layout has these.
     let both = |images: &[serde_json::Value]| {
         let tar = with_index(tar.clone(), images);
-        tar.file("manifest.json", 0o644, &names(&for_riscv)).bytes()
+        tar.file("manifest.json", 0o644, &docker_list(&for_riscv))
+            .bytes()
     };
     let (_dir, _, image) = unpack_valid(&both(&[riscv.clone(), for_host.clone()]));
     assert_eq!(image.text("usr/bin/tool"), "tool");
@@ -748,10 +753,10 @@ fn image_of_the_hosts_platform_is_chosen() {
     newer["platform"] = json!({"architecture": host, "os": "linux", "variant": "v3"});
     let (tar, signature) = TestImage::new([Tar::new().folder("signed/")]).blobs(tar);
     unpack_valid(&with_index(tar, &[newer, for_host, signature]).bytes());
-    let none =
+    let without_os =
         TestImage::agent([]).config(|config| drop(config.as_object_mut().unwrap().remove("os")));
     assert_refused(
-        &none.docker().bytes(),
+        &without_os.docker().bytes(),
         "cannot be read: config.json: missing field `os`",
     );
 }
@@ -833,8 +838,8 @@ fn invalid_documents_are_named() {
         &wrong.docker().bytes(),
         "the container image sets the variable \"a\" (ENV): expected NAME=VALUE",
     );
-    let none = TestImage::agent([]).config(|config| config["config"] = json!(null));
-    let (_dir, _, image) = unpack_valid(&none.docker().bytes());
+    let without_settings = TestImage::agent([]).config(|config| config["config"] = json!(null));
+    let (_dir, _, image) = unpack_valid(&without_settings.docker().bytes());
     assert!(image.env.is_empty() && image.path().ends_with("/bin"));
 }
 
@@ -975,11 +980,13 @@ fn equal_layers_may_be_links() {
     }
 }
 
+/// An image's `/tmp` is emptied, and its named pipes are skipped. A second name of a removed file keeps the content; that of a pipe
+/// is skipped, too.
 #[test]
 fn hard_links_to_removed_files_are_kept() {
     let hard_link =
         |tar: Tar, name: &str, target: &str| tar.entry(EntryType::Link, name, 0o644, target, b"");
-    let cache = Tar::new().file("tmp/cache/a", 0o644, b"wheel").entry(
+    let layer = Tar::new().file("tmp/cache/a", 0o644, b"wheel").entry(
         EntryType::Fifo,
         "opt/pipe",
         0o644,
@@ -987,7 +994,7 @@ fn hard_links_to_removed_files_are_kept() {
         b"",
     );
     let (_dir, image) = unpack_layers([hard_link(
-        hard_link(cache, "usr/b", "tmp/cache/a"),
+        hard_link(layer, "usr/b", "tmp/cache/a"),
         "opt/another",
         "opt/pipe",
     )]);
@@ -1080,10 +1087,10 @@ fn refusal_hints_at_the_probable_mistake() {
             ),
         );
     }
-    let (tar, descriptor) = TestImage::agent([]).blobs(empty_layout());
-    let lacking = TestImage::new([Tar::new().folder("lacking/")]);
-    let (_, absent) = lacking.blobs(empty_layout());
-    drop(descriptor);
+    // The index lists an image whose blobs are not in the archive.
+    let (tar, _) = TestImage::agent([]).blobs(empty_layout());
+    let absent_image = TestImage::new([Tar::new().folder("absent/")]);
+    let (_, absent) = absent_image.blobs(empty_layout());
     assert_refused(
         &with_index(tar, &[absent]).bytes(),
         "which is no file of the archive: pull or build the image again, and save it again",

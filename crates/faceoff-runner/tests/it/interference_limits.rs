@@ -1,6 +1,6 @@
 //! Host interference (time in which the host let others run instead of the agent) counts towards no limit: not in a
-//! validation's verdict, not in the reset budget, not in the start-up limit. A fixed monitor replaces the kernel's
-//! counters.
+//! validation's verdict, not in the reset budget, not in the start-up limit. A monitor that reports a fixed share of each wait
+//! replaces the kernel's counters.
 
 use crate::{
     agents::{Agent, assert_timed_out, sandboxed_environment},

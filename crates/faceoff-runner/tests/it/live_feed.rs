@@ -49,7 +49,7 @@ fn live_feed_has_all_events_in_order_and_all_positions() {
     let outcome = &report.archives.outcome;
     let fouls = outcome.sides.each_ref().map(|side| side.fouls);
     assert_eq!((fouls[0] + fouls[1], outcome.rallies), (1, 2));
-    // The first side to serve commits the foul.
+    // The side that serves first commits the foul.
     let fouling_side = Side::BOTH[usize::from(fouls[1] == 1)];
     let serving_side = |index: usize| match sink.events[index].event {
         GameEvent::RallyBegun { serves, .. } => serves,

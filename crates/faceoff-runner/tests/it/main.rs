@@ -3,7 +3,6 @@
 
 mod agents;
 mod archives;
-mod budget;
 mod bundle;
 mod dataset;
 mod early_cpu_time;
@@ -21,4 +20,5 @@ mod shard;
 mod supervision;
 mod two_agents;
 mod unpacking;
+mod unpacking_budget;
 mod unread_questions;

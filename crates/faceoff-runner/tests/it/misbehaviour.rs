@@ -44,7 +44,7 @@ fn fault(report: &ValidationReport) -> AgentFault {
     }
 }
 
-/// The same for an agent with these hooks, in the usual sandbox.
+/// As [`validation_fault_in`], for an agent with these hooks in the usual sandbox.
 fn validation_fault(hooks: &str) -> (AgentFaultKind, ValidationReport) {
     validation_fault_in(&Agent::with_hooks(hooks), &sandboxed_environment())
 }
@@ -92,6 +92,8 @@ fn validation_length_and_episodes_depend_on_the_seed() {
     assert_ne!(other_log, log);
 }
 
+/// A validation plays the shards of an evaluation in order, from a random one, and each with a new process. It stops when it has
+/// enough steps, so the last shard may be incomplete.
 #[test]
 fn validation_plays_shards_of_the_stage() {
     let agent = Agent::with_hooks(
@@ -110,6 +112,7 @@ fn validation_plays_shards_of_the_stage() {
         assert_eq!(report.timing.len(), 1);
         let lines = report.log.split_whitespace();
         let lines: Vec<_> = lines.filter(|line| *line != "goodbye").collect();
+        // The episodes that each process has played.
         let processes: Vec<_> = lines.split(|line| *line == "start").skip(1).collect();
         let shards = [&["0", "1"][..], &["2", "3"], &["4"]];
         let (last, complete) = processes.split_last().unwrap();
@@ -174,7 +177,7 @@ fn exceeded_time_budget_is_a_fault() {
 #[test]
 fn validation_stops_when_cancelled() {
     let checks = std::cell::Cell::new(0);
-    let stop_at_the_third_step = || {
+    let is_cancelled_at_third_check = || {
         checks.set(checks.get() + 1);
         checks.get() == 3
     };
@@ -182,7 +185,7 @@ fn validation_stops_when_cancelled() {
         &spec(0),
         &Agent::behaving().bundle,
         &sandboxed_environment(),
-        &stop_at_the_third_step,
+        &is_cancelled_at_third_check,
     );
     assert!(matches!(stopped, Err(PlatformFault::Cancelled)));
     assert_eq!(checks.get(), 3);
@@ -375,7 +378,7 @@ fn fault_names_a_wrong_ready_message() {
 }
 
 #[test]
-fn memory_use_exceeds_the_limit() {
+fn memory_use_above_the_limit_is_a_fault() {
     // The agent exceeds the limit before it answers, so the step cannot end in another way.
     let (kind, _) = validation_fault(
         "def on_step(step, answer):\n    hoard = [b'x' * (1 << 20) for _ in range(600)]",

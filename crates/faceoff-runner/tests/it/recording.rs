@@ -210,6 +210,7 @@ fn compare_state(batch: &RecordBatch, prefix: &str, row: usize, world: &Episode)
             None => assert!(floats(batch, &name).is_null(row)),
         }
     }
+    // The angles of the universal joint between arm and mallet.
     assert_same_bits(
         batch,
         &format!("{prefix}universal_1"),

@@ -56,15 +56,15 @@ fn both_sides_are_asked_before_waiting() {
     for session in &mut sessions {
         session.send_reset(0).unwrap();
     }
-    for results in wait_for_both(&mut sessions) {
-        results.unwrap();
+    for result in wait_for_both(&mut sessions) {
+        result.unwrap();
     }
     for step in 0..20 {
         for (number, session) in (1..).zip(&mut sessions) {
             session.send_step(step, &[f64::from(number); 23]).unwrap();
         }
-        for results in wait_for_both(&mut sessions) {
-            assert!(results.unwrap().computation_time_s > 0.0);
+        for result in wait_for_both(&mut sessions) {
+            assert!(result.unwrap().computation_time_s > 0.0);
         }
         for (number, session) in (1..).zip(&mut sessions) {
             assert_eq!(session.action()[..7], [f64::from(number); 7]);
@@ -97,7 +97,7 @@ fn sides_get_separate_verdicts() {
         session.reset(0).unwrap();
         session.send_step(0, &[0.0; 23]).unwrap();
     }
-    let faults = wait_for_both(&mut sessions).map(|results| match results {
+    let faults = wait_for_both(&mut sessions).map(|result| match result {
         // On a busy host the timeout may be attributed to the host; the fault is the same.
         Err(
             SessionError::Agent { fault, .. }

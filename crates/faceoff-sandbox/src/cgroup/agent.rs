@@ -117,7 +117,7 @@ impl AgentCgroup {
                 .set_limit(layer, hierarchy.version, &leaf, limits)
                 .map_err(|error| unavailable(error.to_string()))?;
         }
-        group.measure_cpu(&hierarchies, &name, cpus);
+        group.open_cpu_counters(&hierarchies, &name, cpus);
         if !cpus.is_empty() {
             group.confines_cpus = group.confine_cpus(&hierarchies, &name, cpus);
         }
@@ -151,7 +151,7 @@ impl AgentCgroup {
         controllers: &[&str],
         name: &str,
     ) -> io::Result<PathBuf> {
-        // Another service in the same cgroup may remove the empty parent folder between the two calls.
+        // Another process of Faceoff in the same cgroup may remove the empty parent folder between the two calls.
         for _ in 0..8 {
             let leaf = hierarchy.create_agents_folder(controllers)?.join(name);
             match fs::create_dir(&leaf) {
@@ -221,8 +221,8 @@ impl AgentCgroup {
         Ok(())
     }
 
-    /// Opens the counters of the tree's CPU time and of all other CPU time, if the host has them.
-    fn measure_cpu(&mut self, hierarchies: &Hierarchies, name: &str, cpus: &[usize]) {
+    /// Opens the files with the counters of the tree's CPU time and of all other CPU time, if the host has them.
+    fn open_cpu_counters(&mut self, hierarchies: &Hierarchies, name: &str, cpus: &[usize]) {
         let Some(hierarchy) = hierarchies
             .find("cpuacct")
             .or_else(|| hierarchies.find("cpu"))

@@ -97,7 +97,7 @@ impl Freezer {
     }
 }
 
-/// Thaws the agents of a dead service, so that they can die.
+/// Thaws an agent whose service (the process that started it) is dead, so that it can die.
 pub(super) fn thaw_leaf(leaf: &Path) {
     for (version, state) in [(Version::V1, "THAWED"), (Version::V2, "0")] {
         let file = leaf.join(state_file(version));

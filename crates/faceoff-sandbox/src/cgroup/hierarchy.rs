@@ -1,5 +1,6 @@
 //! Cgroup hierarchies of the host. A *controller* limits one resource, such as memory; a *hierarchy* is a mounted tree of cgroups with
-//! one or more controllers. This module finds them, and the place where the service can create cgroups.
+//! one or more controllers. This module finds them, and the place where the *service* (the process that starts
+//! agents) can create cgroups.
 
 use super::{NOT_OFFERED, files};
 use crate::{SandboxError, error::IoContext};
@@ -211,6 +212,7 @@ fn has_word(text: &str, word: &str) -> bool {
 struct Mount<'a> {
     /// The mounted folder of the file system.
     root: &'a str,
+    /// Where it is mounted.
     point: &'a str,
     filesystem: &'a str,
     options: &'a str,

@@ -52,7 +52,8 @@ fn kill_all(leaf: &Path) {
     }
 }
 
-/// `agent-<pid>-<start time>-<namespace>-<number>`: identifies the service even after its death.
+/// `agent-<pid>-<start time>-<namespace>-<number>`: the first three identify the process that started the agent, even after its
+/// death.
 pub(super) fn leaf_name() -> String {
     let number = NEXT_NUMBER.fetch_add(1, Ordering::Relaxed);
     format!("{}{number}", Owner::this_process().name_prefix(LEAF_PREFIX))

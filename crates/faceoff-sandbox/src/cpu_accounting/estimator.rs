@@ -12,7 +12,7 @@ use std::time::Duration;
 pub(super) struct InterferenceEstimator<'a> {
     /// Do the counters include all processes, in nanoseconds? Otherwise the time of other processes is known in ticks only.
     pub is_precise: bool,
-    /// Earlier waits of the agent's threads.
+    /// The agent's threads' waits before the second reading, as samples showed them.
     pub ledger: &'a WaitLedger,
     pub answer: AnswerState,
 }

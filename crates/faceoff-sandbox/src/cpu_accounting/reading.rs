@@ -10,7 +10,7 @@ pub struct CpuReading {
     /// Run time of the agent, by its cgroup.
     pub(super) agent_run_time: Duration,
     /// Run time of the agent, by the clocks of its processes. They do not lag behind, but miss processes that have ended. Zero in
-    /// a baseline (a reading before a question, which takes only a few microseconds).
+    /// a [`CounterBaseline`](super::CounterBaseline), whose reading must take only a few microseconds.
     pub(super) agent_clock_time: Duration,
     /// Run time of all processes on the agent's CPUs; zero if the host counts in ticks only.
     pub(super) total_run_time: Duration,

@@ -190,7 +190,7 @@ impl<'a> Archive<'a> {
     }
 
     /// Removes all remaining files.
-    pub(super) fn clear(self) -> Result<(), BundleError> {
+    pub(super) fn remove_rest(self) -> Result<(), BundleError> {
         for top in self.top_level_names() {
             let path = self.dir.join(top);
             match self.nodes.get(top) {

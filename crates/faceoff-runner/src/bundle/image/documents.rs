@@ -328,7 +328,7 @@ fn collect_images(
 fn choose_image(mut images: Vec<Descriptor>) -> Result<Descriptor, BundleError> {
     let count = images.len();
     if count > 1 {
-        let others: BTreeSet<String> = images
+        let platforms: BTreeSet<String> = images
             .iter()
             .filter_map(|image| image.platform.as_ref().map(ToString::to_string))
             .collect();
@@ -337,8 +337,8 @@ fn choose_image(mut images: Vec<Descriptor>) -> Result<Descriptor, BundleError> 
             |image: &Descriptor| image.platform.as_ref().is_none_or(Platform::is_general);
         images.retain(|image| is_for_host(image) != Some(false));
         if images.is_empty() {
-            let others: Vec<String> = others.into_iter().take(8).collect();
-            return Err(wrong_platform(&others.join(", ")));
+            let platforms: Vec<String> = platforms.into_iter().take(8).collect();
+            return Err(wrong_platform(&platforms.join(", ")));
         }
         if images.iter().any(|image| is_for_host(image) == Some(true)) {
             images.retain(|image| is_for_host(image) == Some(true));

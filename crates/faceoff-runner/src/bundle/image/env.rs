@@ -71,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn env_accepts_only_variables_for_programs() {
+    fn names_that_no_shell_can_use_are_left_out() {
         assert_eq!(
             result_text(&["A=b=c", "B=", "A=d"]),
             r#"{"A": "d", "B": ""}"#

@@ -9,7 +9,7 @@ use crate::bundle::{
         normalise, set_default_time, write_new,
     },
     error::BundleError,
-    sink::{FileAttributes, Sink, Special},
+    sink::{EntrySink, FileAttributes, Special},
 };
 use fs_err::{self as fs, os::unix::fs::symlink};
 use std::{
@@ -310,7 +310,11 @@ impl<'a> Root<'a> {
     }
 
     /// Adds the parent folders, and removes the existing node at the location.
-    fn clear(&mut self, entry: &str, location: &Location) -> Result<&mut Folder, BundleError> {
+    fn prepare_location(
+        &mut self,
+        entry: &str,
+        location: &Location,
+    ) -> Result<&mut Folder, BundleError> {
         self.add_folders(&location.folder)?;
         let disk_path = self.path_on_disk(&location.folder).join(&location.name);
         let folder = self
@@ -342,7 +346,7 @@ impl<'a> Root<'a> {
         }
         let layer = self.layer;
         let is_written = matches!(kind, Kind::File);
-        let folder = self.clear(entry, location)?;
+        let folder = self.prepare_location(entry, location)?;
         folder
             .children
             .insert(location.name.clone(), Node { layer, kind });
@@ -468,7 +472,7 @@ impl<'a> Root<'a> {
                 folder: Vec::new(),
                 name: name.to_owned(),
             };
-            self.clear(name, &location)?;
+            self.prepare_location(name, &location)?;
             self.add_folders(&[name.to_owned()])?;
         }
         make_folders(&mut self.top_folder, &self.disk_path, self.budget)?;
@@ -477,7 +481,7 @@ impl<'a> Root<'a> {
     }
 }
 
-impl Sink for Root<'_> {
+impl EntrySink for Root<'_> {
     /// An existing folder stays unchanged, because all folders have the same mode.
     fn add_folder(&mut self, entry: &str) -> Result<(), BundleError> {
         let Some(location) = self.location_for(entry)? else {
@@ -493,7 +497,7 @@ impl Sink for Root<'_> {
             node.layer = layer;
             return Ok(());
         }
-        self.clear(entry, &location)?;
+        self.prepare_location(entry, &location)?;
         self.add_folders(&path)
     }
 

@@ -1,4 +1,4 @@
-//! Fuzz test of datasets: each is read, or refused as differing, altered or unreadable.
+//! Fuzz test of datasets: each is read, or refused as differing, altered, unreadable or foreign (of another version).
 
 use super::{assert_outcomes, fuzz, mutation::mutate, rng::Rng};
 use faceoff_airhockey::{DEFEND, EVALUATION, HIT, simulator};

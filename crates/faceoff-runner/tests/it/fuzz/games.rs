@@ -1,4 +1,4 @@
-//! Fuzz test of recordings of games: each is read, or refused as differing, altered or unreadable.
+//! Fuzz test of recordings of games: each is read, or refused as differing, altered, unreadable or foreign (of another version).
 
 use super::{
     assert_outcomes,

@@ -1,5 +1,6 @@
-//! Fuzz tests with mutations of valid input: nothing may panic, nothing may be reported as a platform fault, and every
-//! kind of refusal must occur. Tests run a fixed number of inputs; `make fuzz MINUTES=60` runs longer.
+//! Fuzz tests with mutations of valid input: nothing may panic, nothing may be reported as a platform fault, and every kind of refusal
+//! must occur. Each kind of input is a *target* with its own test. Tests run a fixed number of inputs; `make fuzz MINUTES=60` runs
+//! longer.
 
 mod answers;
 mod archives;

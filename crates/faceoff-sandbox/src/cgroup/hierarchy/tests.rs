@@ -1,4 +1,5 @@
 //! Hosts with cgroup version 1, version 2 and both (*hybrid*), as `/proc/self/mountinfo` and `/proc/self/cgroup` show them.
+//! The *service* is the process that starts agents.
 
 use super::*;
 

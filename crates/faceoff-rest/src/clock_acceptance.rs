@@ -1,4 +1,4 @@
-//! The server's clock: organisers accept a step of the system clock.
+//! The server's clock: it ignores a step of the system clock (a jump to another time) until an organiser accepts the step.
 
 use axum::{extract::State, http::StatusCode};
 use faceoff_api::requests::Confirmation;
@@ -6,7 +6,7 @@ use faceoff_service::{
     app::App, auth::Organiser, extract::Json as Body, problem::Problem, services::clock_step,
 };
 
-/// Accepts the time of the system clock after it was set, so that the server uses it.
+/// Accepts the time of the system clock after it was set to another time, so that the server uses it.
 ///
 /// Until then the server continues its own time. `confirm` is the step's size, which `GET /health` and the response without
 /// `confirm` name, such as `3600 s ahead`.

@@ -1,4 +1,4 @@
-//! Removal of the cgroups of killed services.
+//! Removal of the cgroups (*leaves*) of agents whose *service*, the process that started them, was killed.
 
 use super::{
     hierarchy::{AGENTS_FOLDER, Hierarchies},

@@ -1,5 +1,5 @@
-//! Time budgets over many answers (`docs/rules.md`, "Real time is the rule"). With only a limit per answer, an agent could occupy a
-//! worker's slot for days.
+//! Time budgets over many answers, in addition to the limit of each answer (`docs/rules.md`, "Real time is the rule"). With only a limit
+//! per answer, an agent could occupy a worker's slot for days.
 
 use faceoff_types::{AgentFaultKind, Phase, TimeLimits};
 
@@ -30,8 +30,8 @@ impl<'a> EpisodeBudget<'a> {
     pub fn spend(&mut self, answer_s: f64) -> Result<(), AgentFaultKind> {
         self.used_s += answer_s;
         self.steps += 1;
-        let control_s = f64::from(self.steps) * self.control_step_s;
-        let limit_s = self.time.episode_control_times * control_s + self.time.episode_extra_s;
+        let simulated_s = f64::from(self.steps) * self.control_step_s;
+        let limit_s = self.time.episode_control_times * simulated_s + self.time.episode_extra_s;
         check_limit(Phase::Step, self.used_s, limit_s)
     }
 }

@@ -1,4 +1,4 @@
-//! Says how to provide a layer of the sandbox, from the error with which the host refused it.
+//! Advice for operators: how to make the host provide a layer of the sandbox, from the error with which it refused it.
 
 use crate::{
     Layer, Limits,

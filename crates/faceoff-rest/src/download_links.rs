@@ -1,4 +1,4 @@
-//! Signed links, which download one file without a token for a limited time.
+//! Signed links, which download one file (a bundle, dataset or recording) without a token for a limited time.
 //!
 //! Permissions are checked when a link is used, as for its creator: the link is valid as long as the creator's token is, and
 //! gives the access that the creator has at that time. The signature includes the hash of the token, so rotating the token

@@ -54,35 +54,34 @@ pub(super) fn describe(document: &mut Value, competition: &Competition) {
         "description": format!("A named set of perturbations.\n{}", profiles.collect::<String>()),
         "enum": competition.profile_names().map(|profile| profile.to_string()).collect::<Vec<_>>(),
     });
-    let kinds = competition.violations.iter();
-    let kinds = kinds.map(|info| {
+    let violations = competition.violations.iter();
+    let counts = violations.map(|info| {
         let schema =
             json!({"type": "integer", "format": "int32", "minimum": 0, "description": info.description});
         (info.name.to_string(), schema)
     });
-    let violations: Map<String, Value> = kinds.collect();
+    let counts: Map<String, Value> = counts.collect();
     schemas[&*ViolationCounts::name()] = json!({
         "type": "object",
         "description": "For each kind of violation, the number of episodes with it.",
-        "required": violations.keys().collect::<Vec<_>>(),
-        "properties": &violations,
+        "required": counts.keys().collect::<Vec<_>>(),
+        "properties": &counts,
     });
-    let episodes = |of: &str| json!({"type": "array", "items": {"$ref": format!("#/components/schemas/{of}")}});
+    let list_of = |of: &str| json!({"type": "array", "items": {"$ref": format!("#/components/schemas/{of}")}});
     let lists = competition.violations.iter().map(|info| {
-        let is_late = info.name == ViolationName::COMPUTATION_TIME;
-        let of = if is_late {
+        let of = if info.name == ViolationName::COMPUTATION_TIME {
             "SlowEpisode"
         } else {
             "ConstraintViolation"
         };
-        let mut schema = episodes(of);
+        let mut schema = list_of(of);
         schema["description"] = info.measure.clone().into();
         (info.name.to_string(), schema)
     });
     schemas["TaskViolations"] = json!({
         "type": "object",
         "description": "The violations of one task: for each kind, the episodes with it.",
-        "required": violations.keys().collect::<Vec<_>>(),
+        "required": counts.keys().collect::<Vec<_>>(),
         "properties": lists.collect::<Map<String, Value>>(),
     });
     schemas[&*Magnitudes::name()] = magnitudes(competition);
@@ -105,7 +104,7 @@ pub(super) fn describe(document: &mut Value, competition: &Competition) {
     });
 }
 
-/// Tournaments' rules have the defaults of the competition, in descriptions of rules and of their changes.
+/// Adds the competition's defaults to the schemas of a tournament's rules, and of changes of them.
 fn add_defaults(schemas: &mut Value, competition: &Competition) {
     let rules = json!(competition.tournament_rules());
     for name in ["TournamentRules", "TournamentRulesChange"] {

@@ -1,4 +1,4 @@
-//! NumPy arrays into which a step writes its results.
+//! The NumPy arrays, allocated by the Python half, into which a step writes its results. They become [`Outputs`], slices of the arrays.
 
 use crate::{
     errors::argument_error,
@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 /// Arrays with a row per world, allocated by the Python half: observations, final observations, rewards, terminated,
 /// truncated, facts, true states and next true states; see [`Outputs`].
 #[derive(FromPyObject)]
-pub struct OutputArrays<'py>(
+pub struct NumpyOutputs<'py>(
     PyReadwriteArray2<'py, f32>,
     PyReadwriteArray2<'py, f32>,
     PyReadwriteArray1<'py, f64>,
@@ -22,7 +22,7 @@ pub struct OutputArrays<'py>(
     PyReadwriteArray2<'py, f64>,
 );
 
-impl OutputArrays<'_> {
+impl NumpyOutputs<'_> {
     /// The arrays as slices of `worlds` rows.
     ///
     /// # Errors

@@ -1,6 +1,6 @@
 //! Paged lists in the OpenAPI document: routes with the query parameter `after` return a link to the next page.
 
-use super::files::inline_parameters;
+use super::conditional_requests::inline_parameters;
 use utoipa::openapi::{
     Header, Object, RefOr, Response, Type,
     path::{Operation, ParameterIn},

@@ -211,7 +211,8 @@ fn cancellation_stops_unpacking_at_any_point() {
 /// A zip whose files share their bytes. Each file's data is a literal copy of the next file's header, followed by that
 /// file's data. The last file has `tail` bytes that decompress to nothing. Reading any file reads the tail again.
 fn shared_zip(files: usize, tail: usize) -> Vec<u8> {
-    let stored = |last: bool, bytes: &[u8]| {
+    // A block of uncompressed data in a deflate stream; `last` ends the stream.
+    let stored_block = |last: bool, bytes: &[u8]| {
         let length = u16::try_from(bytes.len()).unwrap();
         let mut block = vec![u8::from(last)];
         block.extend_from_slice(&length.to_le_bytes());
@@ -237,10 +238,11 @@ fn shared_zip(files: usize, tail: usize) -> Vec<u8> {
         fields
     };
     // From the last file to the first; `data` is the compressed data of a file.
-    let mut data = stored(false, b"").repeat(tail / 5);
-    data.extend_from_slice(&stored(true, b""));
+    let mut data = stored_block(false, b"").repeat(tail / 5);
+    data.extend_from_slice(&stored_block(true, b""));
     let mut contents: Vec<u8> = Vec::new();
     let mut directory = Vec::new();
+    // By file: the fields of its header, and the distance of the header from the end of all files.
     let mut headers = Vec::new();
     for file in (0..files).rev() {
         let mut crc = Crc::new();
@@ -254,7 +256,7 @@ fn shared_zip(files: usize, tail: usize) -> Vec<u8> {
             header.extend_from_slice(&data);
             data = header;
         } else {
-            let mut literal = stored(false, &header);
+            let mut literal = stored_block(false, &header);
             literal.extend_from_slice(&data);
             data = literal;
             header.extend_from_slice(&contents);

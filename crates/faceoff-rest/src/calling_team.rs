@@ -1,4 +1,4 @@
-//! Status of the calling team.
+//! Status of the calling team (`GET /me`).
 
 use axum::{Json, extract::State};
 use faceoff_api::views::me::MeView;
