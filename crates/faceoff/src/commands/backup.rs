@@ -1,5 +1,5 @@
-//! `faceoff backup`: a complete, checked copy of a server's data folder, made while the server runs. An *artifact* is a stored
-//! file that the database refers to, e.g. a bundle or a dataset.
+//! `faceoff backup`: a checked copy of a server's data folder, made while the server runs: complete, but for files that a damaged
+//! folder itself lacks. An *artifact* is a stored file that the database refers to, e.g. a bundle or a dataset.
 
 pub mod files;
 pub mod manifest;
@@ -24,9 +24,10 @@ use std::{
 };
 
 /// Copies all data of a server into a folder: the database with the season's secret, the artifacts and the operator's
-/// token. The server keeps running. The copy is complete or absent, readable by its owner only, and checked: the
-/// database is intact, and every file it refers to exists with the recorded hash. Keep the copy as secret as the
-/// server itself.
+/// token. The server keeps running. An interrupted backup leaves no folder. The copy is readable by its owner only, and
+/// checked: the database is intact, and every file it refers to exists with the recorded hash. If the data folder
+/// itself lacks such a file, the copy is made without it, the file is named, and the command ends with an error. Keep
+/// the copy as secret as the server itself.
 #[derive(Debug, Args)]
 pub struct BackupCommand {
     /// The folder to create; an existing folder must be empty
