@@ -328,7 +328,7 @@ fn about_tournaments(event_text: &EventText<'_>, names: &Names) -> Option<String
         },
         "game_begun" => format!("started {subject}"),
         "game_played" => format!("finished {subject}"),
-        "game_broken" => format!("gave up {subject} after a platform fault"),
+        "game_broken" => format!("gave up {subject} after platform faults"),
         "game_voided" => format!("voided {subject}"),
         "game_queued_again" => format!("queued {subject} once more"),
         "game_cancelled" => format!("cancelled {subject}"),
