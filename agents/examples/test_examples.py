@@ -43,7 +43,7 @@ def hold_success_percent() -> float:
 
 
 @pytest.mark.parametrize("name", TRAINED)
-def test_trained_weights_beat_holding_by_30_points(name: str, hold_success_percent: float) -> None:
+def test_trained_weights_beat_holding_by_30_percentage_points(name: str, hold_success_percent: float) -> None:
     scored = score(Player(SavedPolicy(TRAINED[name])), EPISODES)
     assert 100.0 * scored["success_rate"] >= hold_success_percent + 30.0
     assert scored["tier"] == "deployable"

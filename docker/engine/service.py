@@ -21,16 +21,19 @@ service = compose["services"][name]
 
 
 def volume(value):
+    """A volume of the service as options of `docker run`; it must be defined in the file."""
     if value.split(":")[0] not in compose["volumes"]:
         sys.exit(f"error: {name} has the volume {value}, which the file does not define")
     return ["--volume", value]
 
 
 def seconds(value):
+    """The number of a duration such as `30s`."""
     return str(int(value.removesuffix("s")))
 
 
 def config(value):
+    """A configuration file of the service as options of `docker run`: Compose would mount it, too."""
     return ["--volume", f"{configs / value['source']}:{value['target']}:ro"]
 
 
@@ -58,6 +61,7 @@ CONVERTERS = {
     "networks": network,
     "cpuset": lambda value: ["--cpuset-cpus", variables(value)],
 }
+# Keys without an effect in the test, whose services are started in order and reached from inside the network.
 LEFT_OUT = {"ports", "depends_on"}
 # Keys that are used for the image and its command, below.
 IMAGE = {"build", "image", "command"}

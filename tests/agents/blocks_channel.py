@@ -42,6 +42,7 @@ def full_socket():
 
 
 def empty_socket():
+    """The end of a socket pair to which nothing is ever sent."""
     pair = socket.socketpair()
     references.extend(pair)
     return pair[0].fileno()

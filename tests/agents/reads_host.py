@@ -25,6 +25,7 @@ hidden = sys.argv[2:] + [
     "/sys/kernel", "/srv", "/boot", "/proc/1/root/etc/shadow", "/proc/1/cwd/../../etc/shadow",
     "/proc/kcore", "/dev/mem", "/dev/kmsg", "/dev/vda", "/dev/sda", "/dev/fuse", "/dev/kvm",
 ]
+# The hidden files that could be read all the same.
 reached = []
 for path in hidden:
     found = attempt(lambda: os.listdir(path)) if os.path.isdir(path) else attempt(lambda: read(path))

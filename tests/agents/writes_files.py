@@ -8,6 +8,7 @@ places = sys.argv[2:] + [
     "/", "/agent", "/usr", "/usr/lib", "/lib", "/etc", "/dev", "/proc", "/proc/sys/kernel", "/sys", "/var",
     "/run", "/home", "/root", "/tmp", "/dev/shm",
 ]
+# Places in which a new file could be created.
 took = []
 for place in places:
     name = os.path.join(place, "written-by-agent")
@@ -24,6 +25,7 @@ for place in places:
         except (OSError, IndexError):
             pass
 
+# Existing files and folders that could be changed.
 changed = []
 for file in ("/agent/" + os.path.basename(__file__), "/etc/passwd", "/proc/sys/kernel/core_pattern",
              "/proc/sysrq-trigger", "/proc/sys/vm/overcommit_memory"):

@@ -241,7 +241,7 @@ impl DashboardHeader {
             user: caller.user().map_or_else(
                 || match caller.team() {
                     Some(_) => "team token".to_owned(),
-                    None => "administrator of the host".to_owned(),
+                    None => "operator".to_owned(),
                 },
                 |user| user.name.to_string(),
             ),

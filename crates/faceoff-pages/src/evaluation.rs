@@ -341,7 +341,9 @@ const fn state_text(view: &EvaluationView) -> &'static str {
         EvaluationStatus::Finished { .. } | EvaluationStatus::AgentFailed { .. } if view.blind => {
             HIDDEN
         }
-        EvaluationStatus::Queued => "Waiting for a free slot.",
+        EvaluationStatus::Queued => {
+            "Waiting for a free slot, a place in which a machine runs one agent at a time."
+        }
         EvaluationStatus::Running => "Running.",
         EvaluationStatus::Scoring => "All episodes have been played; the score is being computed.",
         EvaluationStatus::Finished { .. } => "",

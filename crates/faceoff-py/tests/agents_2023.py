@@ -71,6 +71,7 @@ Q = np.random.default_rng(0).uniform(-0.9, 0.9, (40, 7)) * model.POSITION_LIMIT_
 
 
 def convert(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    """Runs `python -m faceoff.challenge_2023`, which makes a bundle from a team's folder."""
     command = [sys.executable, "-m", "faceoff.challenge_2023", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True)
 
@@ -83,6 +84,7 @@ def program(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
 
 
 def answers_of(agent: Any, *messages: dict[str, Any]) -> list[dict[str, Any]]:
+    """What the agent's class answers to these messages of the protocol."""
     output = io.BytesIO()
     try:
         run(agent, [json.dumps(message).encode() for message in messages], output)

@@ -28,10 +28,12 @@ class Hold(Agent):
 
 
 def lines(*messages: dict[str, Any]) -> list[bytes]:
+    """Messages as the lines that an agent reads."""
     return [json.dumps(message).encode() + b"\n" for message in messages]
 
 
 def answers_of(agent: type[Agent], *messages: dict[str, Any]) -> list[dict[str, Any]]:
+    """What an agent answers to these messages."""
     output = io.BytesIO()
     run(agent, lines(*messages), output)
     return [json.loads(line) for line in output.getvalue().splitlines()]
@@ -51,6 +53,7 @@ def error_of(agent: type[Agent], *messages: dict[str, Any]) -> str:
 
 
 def constant_agent(action: Any, code: int | None = 3) -> type[Agent]:
+    """An agent that always answers with this action, of the interpolation `code`."""
     class ConstantAgent(Agent):
         interpolation = code
 

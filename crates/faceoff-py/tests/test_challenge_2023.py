@@ -27,6 +27,7 @@ from faceoff.kinematics import constraints, forward, model
 TASKS = ("hit", "defend", "prepare")
 
 EPISODES = 5
+"""Episodes of each task."""
 
 GAIN = 4.0
 """The parameter in the team's agent_config.yml."""

@@ -24,6 +24,7 @@ def recordings() -> list[Path]:
     return [hold(), odd(), LAYOUT_2, LAYOUT_3]
 
 
+# Their number.
 RECORDINGS = 4
 
 

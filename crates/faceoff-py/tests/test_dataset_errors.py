@@ -144,6 +144,7 @@ def test_errors_derive_from_faceoff_error(tmp_path: Path) -> None:
 
 
 def command(*arguments: object) -> tuple[int, str, str]:
+    """Runs `python -m faceoff.dataset`: its exit status, standard output and standard error."""
     done = subprocess.run(
         [sys.executable, "-m", "faceoff.dataset", *map(str, arguments)],
         capture_output=True,

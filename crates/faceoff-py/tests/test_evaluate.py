@@ -18,7 +18,7 @@ from faceoff import _native
 from faceoff.gym import AirHockeyEnv
 
 ROOT = Path(__file__).parents[3]
-BINARY = Path(os.environ.get("FACEOFF_BIN", ROOT / "target" / "debug" / "faceoff"))
+PROGRAM = Path(os.environ.get("FACEOFF_BIN", ROOT / "target" / "debug" / "faceoff"))
 
 
 def hold(observation: np.ndarray) -> np.ndarray:
@@ -106,9 +106,9 @@ def test_diverging_policy_has_an_agent_fault() -> None:
 
 
 @pytest.mark.parametrize("profile", ["ideal", "evaluation"])
-def test_binary_gives_the_same_numbers(profile: str, tmp_path: Path) -> None:
-    assert BINARY.exists(), f"build it first: cargo build --workspace --bins ({BINARY})"
-    command: list[str | Path] = [BINARY, "eval", ROOT / "agents" / "hold", "--no-sandbox"]
+def test_program_gives_the_same_numbers(profile: str, tmp_path: Path) -> None:
+    assert PROGRAM.exists(), f"build it first: cargo build --workspace --bins ({PROGRAM})"
+    command: list[str | Path] = [PROGRAM, "eval", ROOT / "agents" / "hold", "--no-sandbox"]
     command += ["--episodes", "6", "--seed", "17", "--profile", profile, "--out", tmp_path]
     subprocess.run(command, check=True, capture_output=True, timeout=600, cwd=tmp_path)
     from_program = json.loads((tmp_path / "results.json").read_text())
@@ -137,7 +137,7 @@ def test_binary_gives_the_same_numbers(profile: str, tmp_path: Path) -> None:
 
 
 def test_dataset_has_the_seed_of_its_robot(tmp_path: Path) -> None:
-    command: list[str | Path] = [BINARY, "eval", ROOT / "agents" / "hold", "--no-sandbox", "--task", "defend"]
+    command: list[str | Path] = [PROGRAM, "eval", ROOT / "agents" / "hold", "--no-sandbox", "--task", "defend"]
     command += ["--episodes", "4", "--seed", "17", "--mismatch-seed", "9", "--out", tmp_path]
     subprocess.run(command, check=True, capture_output=True, timeout=600, cwd=tmp_path)
     dataset = faceoff.dataset.open(tmp_path)

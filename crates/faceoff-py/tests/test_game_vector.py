@@ -45,7 +45,7 @@ def test_games_equal_single_games_to_the_bit(mode: str, threads: int) -> None:
         assert_rows_equal(observations, expected)
         if mode == "Disabled" and fresh.all():
             observations, infos = envs.reset(options={"reset_mask": fresh})
-            assert infos["game_number"].tolist() == [singles[0]._batch.rows.numbers[0] + 1] * 6
+            assert infos["game_number"].tolist() == [singles[0]._batch.results.numbers[0] + 1] * 6
             expected = [single.reset()[0] for single in singles]
             fresh[:] = False
             continue
@@ -74,6 +74,7 @@ def test_games_equal_single_games_to_the_bit(mode: str, threads: int) -> None:
 
 
 def assert_rows_equal(observations: np.ndarray, singles: list[dict[str, np.ndarray]]) -> None:
+    """The rows of many games are the observations of both robots in the single games, game by game."""
     both = [observation for single in singles for observation in single.values()]
     np.testing.assert_array_equal(observations, both)
 

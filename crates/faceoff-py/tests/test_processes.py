@@ -17,12 +17,14 @@ from faceoff.gym import AirHockeyEnv, AirHockeyVectorEnv
 
 
 def step_five_times(envs: Any) -> np.ndarray:
+    """The observations after five steps."""
     for _ in range(5):
         observations, *_ = envs.step(np.full(envs.action_space.shape, 0.5))
     return observations
 
 
 def make_and_step(_index: int) -> np.ndarray:
+    """The work of a process of a pool, which passes its index."""
     envs = AirHockeyVectorEnv(16, "hit", threads=2)
     envs.reset(seed=3)
     return step_five_times(envs)

@@ -54,7 +54,7 @@ def own_percent(training: tuple[Path, str]) -> float:
     return 100.0 * float(re.findall(r"^success rate ([0-9.]+) of", training[1], re.MULTILINE)[0])
 
 
-def test_policy_beats_holding_by_30_points(own_percent: float) -> None:
+def test_policy_beats_holding_by_30_percentage_points(own_percent: float) -> None:
     assert own_percent >= HOLD_PERCENT + 30.0
 
 

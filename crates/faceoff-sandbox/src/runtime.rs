@@ -163,7 +163,7 @@ impl Runtime {
 
 /// The path at which `copy`, the folder of [`RuntimeFiles::Copy`], holds the host's `path`.
 pub(crate) fn path_in_copy(copy: &Path, path: &Path) -> PathBuf {
-    image.join(path.strip_prefix("/").unwrap_or(path))
+    copy.join(path.strip_prefix("/").unwrap_or(path))
 }
 
 /// File layout of an interpreter, as it reports it.

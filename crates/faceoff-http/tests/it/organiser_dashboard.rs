@@ -702,7 +702,7 @@ async fn log_is_sentences_with_names() {
     for sentence in [
         "Grace disqualified Alpha: it read the <b>seed</b>",
         "Grace joined as an organiser",
-        "The administrator of the host created the team Beta",
+        "The operator created the team Beta",
         "Alpha’s submission valid: agent “agent”",
         "queued Alpha’s evaluation of 2026-03-01",
     ] {

@@ -137,7 +137,7 @@ fn token_row(
         _ if is_own => "you".to_owned(),
         (Some(id), _) => name(format!("person:{id}")),
         (None, Some(id)) => format!("team {}", name(format!("team:{id}"))),
-        (None, None) => "administrator of the host".to_owned(),
+        (None, None) => "operator of the server".to_owned(),
     };
     let state = expiry_state(token.revoked_at, token.expires_at, now);
     let last_used = token.last_used_at.map(utc_minute);

@@ -56,6 +56,17 @@ impl Page {
             .join(" · ")
     }
 
+    /// The author as the log stores it, with a word about those without an account.
+    fn stored_author(&self, event: &EventView) -> String {
+        match event.actor.as_str() {
+            "organiser" => "organiser (the operator)".to_owned(),
+            "visitor" if event.subject.starts_with("person:") => {
+                "a visitor, with an invitation".to_owned()
+            }
+            actor => actor.to_owned(),
+        }
+    }
+
     /// Is this the chosen author?
     fn is_chosen(&self, author: &str) -> bool {
         self.query.actor.as_deref() == Some(author)

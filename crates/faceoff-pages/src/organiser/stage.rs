@@ -20,7 +20,7 @@ use faceoff_service::{
     viewer::Viewer,
     views::stage,
 };
-use faceoff_types::{CountingResult, Profile, StageId};
+use faceoff_types::{CountingResult, ProfileInfo, StageId};
 
 #[derive(Template)]
 #[template(path = "organiser_stage.html")]
@@ -32,7 +32,7 @@ struct Page {
     /// Names of the tasks' checkboxes, and titles of the tasks.
     task_checkboxes: Vec<(String, String)>,
     /// All profiles of the competition.
-    profiles: Vec<Profile>,
+    profiles: Vec<ProfileInfo>,
     /// The name that confirms a change with consequences; the refusal lists them.
     confirm: Option<String>,
     is_closed: bool,
@@ -59,7 +59,7 @@ async fn page_with(
         head: DashboardHeader::new(&user.caller, "/organiser/stages", notice),
         form,
         task_checkboxes: StageForm::task_checkboxes(app.config.competition()),
-        profiles: app.config.competition().profile_names().collect(),
+        profiles: app.config.competition().profiles.clone(),
         confirm: needs_confirmation.then(|| view.name.to_string()),
         is_closed: view.phase == PhaseView::Closed,
         has_final_day: view.settings.counting_result == CountingResult::Final,

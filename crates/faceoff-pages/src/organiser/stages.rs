@@ -16,7 +16,7 @@ use faceoff_api::views::stage::StageView;
 use faceoff_service::{
     app::App, extract::PageForm, problem::Problem, services::stages, views::stage,
 };
-use faceoff_types::Profile;
+use faceoff_types::ProfileInfo;
 
 #[derive(Template)]
 #[template(path = "organiser_stages.html")]
@@ -28,7 +28,7 @@ struct Page {
     /// Names of the tasks' checkboxes, and titles of the tasks.
     task_checkboxes: Vec<(String, String)>,
     /// All profiles of the competition.
-    profiles: Vec<Profile>,
+    profiles: Vec<ProfileInfo>,
     /// Always `None`: creating a stage needs no confirmation. `stage_fields.html` expects the field.
     confirm: Option<String>,
     /// Was a form refused? Then it is shown open.
@@ -58,7 +58,7 @@ async fn render_page(
         stages: stage::all(app).await?,
         form,
         task_checkboxes: StageForm::task_checkboxes(app.config.competition()),
-        profiles: app.config.competition().profile_names().collect(),
+        profiles: app.config.competition().profiles.clone(),
         confirm: None,
         is_refused: matches!(notice, Notice::Refused(_)),
     };

@@ -1,4 +1,4 @@
-"""Checks of arguments, and the environment setup that the native half reads.
+"""Checks of arguments, and the environment setup that the native half (`faceoff._native`, compiled from Rust) reads.
 
 A *factor* is one kind of perturbation, a difference from the ideal simulator; a *profile* is a set of active factors.
 """
@@ -72,7 +72,7 @@ def _whole_number(value: object) -> int | None:
 
 
 def flag(name: str, value: object) -> bool:
-    """``value`` as a bool: one of Python or NumPy, or 0 or 1. Other values have a truth value that surprises."""
+    """``value`` as a bool: one of Python or NumPy, or 0 or 1. Others are refused: the text "False", for example, is true."""
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value.item()
     if isinstance(value, (bool, np.bool_)) or (isinstance(value, (int, np.integer)) and value in (0, 1)):

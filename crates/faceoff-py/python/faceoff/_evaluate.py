@@ -151,6 +151,7 @@ def _policies(policy: object, tasks: Iterable[str]) -> dict[str, Policy]:
 
 
 def _run_in_process(policies: Mapping[str, Policy], setup: _Setup, part: Sequence[tuple[str, range]]) -> list[str]:
+    """Runs the part of the evaluation that one worker process gets: tasks, each with numbers of episodes."""
     evaluation = setup.evaluation()
     return [
         outcome
@@ -162,6 +163,7 @@ def _run_in_process(policies: Mapping[str, Policy], setup: _Setup, part: Sequenc
 def _run_episodes(
     evaluation: _native.Evaluation, setup: _Setup, policy: Policy, task: str, episodes: range
 ) -> list[str]:
+    """Runs episodes of a task; returns the outcome of each as JSON."""
     outcomes = []
     reset = getattr(policy, "reset", None)
     for episode in episodes:

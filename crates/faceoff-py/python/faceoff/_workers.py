@@ -19,7 +19,7 @@ from typing import Any
 
 from faceoff.errors import ArgumentTypeError, Error
 
-#: A worker's program. The caller's packages may be where only its path leads, so standard input begins with that.
+#: A worker's program. Its standard input begins with the caller's `sys.path`, so that it finds the same packages.
 PROGRAM = "import pickle, sys; sys.path[:] = pickle.load(sys.stdin.buffer); from faceoff._workers import main; main()"
 
 

@@ -8,7 +8,8 @@ a Faceoff environment with that interface::
     envs = faceoff.sb3.make_vec_env("defend", 64, profile="evaluation", clip_actions=True)
     PPO("MlpPolicy", envs).learn(1_000_000)
 
-Stable-Baselines3 needs torch and is only imported by that call.
+Stable-Baselines3 needs torch, so only that call imports it. The *infos* of a step are dictionaries in
+Stable-Baselines3, one per world; in Gymnasium's vector environments they are arrays with masks.
 """
 
 from __future__ import annotations

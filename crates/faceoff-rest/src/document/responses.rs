@@ -3,7 +3,7 @@
 
 use super::{
     conditional_requests::{self, inline_parameters},
-    lists,
+    paged_lists,
 };
 use axum::http::StatusCode;
 use faceoff_service::problem::{Problem, ProblemBody};

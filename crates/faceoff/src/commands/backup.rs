@@ -1,5 +1,5 @@
-//! `faceoff backup`: a complete, checked copy of a server's data folder, made while the server runs. An *artifact* is a stored
-//! file that the database refers to, e.g. a bundle or a dataset.
+//! `faceoff backup`: a checked copy of a server's data folder, made while the server runs. It is complete, but for files that the data
+//! folder itself lacks. An *artifact* is a stored file that the database refers to, e.g. a bundle or a dataset.
 
 pub mod files;
 pub mod manifest;
@@ -24,9 +24,10 @@ use std::{
 };
 
 /// Copies all data of a server into a folder: the database with the season's secret, the artifacts and the operator's
-/// token. The server keeps running. The copy is complete or absent, readable by its owner only, and checked: the
-/// database is intact, and every file it refers to exists with the recorded hash. Keep the copy as secret as the
-/// server itself.
+/// token. The server keeps running. The folder appears only when all is copied and checked, readable by its owner only:
+/// the database is intact, and every file it refers to exists with the recorded hash. If such a file is missing or
+/// damaged in the data folder itself, the copy is still made, each of these files is named, and the command ends with
+/// an error. Keep the copy as secret as the server itself.
 #[derive(Debug, Args)]
 pub struct BackupCommand {
     /// The folder to create; an existing folder must be empty

@@ -69,7 +69,7 @@ enum Action {
         #[arg(long, value_parser = parse_side)]
         side: Option<Side>,
     },
-    /// Cancel an unfinished friendly or test game that your team has requested
+    /// Cancel a pending friendly or test game that your team has requested
     Cancel {
         /// The game's id
         game: GameId,

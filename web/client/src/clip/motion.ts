@@ -75,7 +75,7 @@ export interface Motion {
     readonly vx: Float64Array | null;
     readonly vy: Float64Array | null;
   };
-  /** Robot 1 (side A), and the opponent if there is one. */
+  /** Robot 1 (side 0), and robot 2, the opponent (side 1), if there is one. */
   readonly arms: readonly ArmMotion[];
   readonly contacts: readonly Contact[];
   readonly violations: readonly Violation[];

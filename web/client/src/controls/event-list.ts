@@ -4,8 +4,9 @@ import type { ReplayEvent } from "../replay/events";
 import { button, h } from "./dom";
 import { timeText, type TimeFormat } from "./format";
 
-/** Rows of the short list: some before the current event, and the ones that follow. */
+/** Rows of the short list before the current event. */
 const ROWS_BEFORE = 4;
+/** All rows of the short list. */
 const ROWS = 12;
 
 /** List of events; each is a button that seeks to it. A long list is short at first, and follows the current event. */

@@ -5,7 +5,9 @@ import type { FrameState, Look } from "../replay/frame-state";
 import type { Palette } from "../replay/palette";
 import type { Projection } from "./projection";
 
+/** Pattern of the circle of the observed puck: lengths of dash and gap, pixels. */
 const SEEN_DASHES = [4, 3];
+/** The pattern of a line without gaps. */
 const SOLID: number[] = [];
 /** Size of the halo relative to the puck, its least radius in pixels, and its opacity. */
 const HALO = { size: 1.9, leastRadius: 9, opacity: 0.22 };

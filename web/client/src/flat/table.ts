@@ -13,7 +13,9 @@ const TICKS_Y_M = [-0.4, -0.2, 0, 0.2, 0.4];
 /** Position of the title of the y axis, above its highest label. */
 const Y_AXIS_TITLE_M = 0.56;
 const FONT = '12px system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", "Liberation Sans", sans-serif';
+/** Pattern of the edge of the success region: lengths of dash and gap, pixels. */
 const DASHES = [5, 4];
+/** The pattern of a line without gaps. */
 const SOLID: number[] = [];
 
 /** Draws everything static. It is drawn once per size and colour scheme, then copied into each frame. */

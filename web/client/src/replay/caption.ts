@@ -2,7 +2,7 @@
 
 import type { ColourName, Palette } from "./palette";
 
-/** A piece of the first line; with a colour, a square of that colour is before it. */
+/** A piece of a caption's first line; with a colour, a square of that colour is before it. */
 export interface CaptionPart {
   readonly text: string;
   readonly colour?: ColourName;

@@ -35,6 +35,7 @@ export interface LinkTarget {
   readonly hiddenKinds?: readonly SwitchedKind[];
 }
 
+/** Names of the layers in a link; of the agent's data, `commanded` is the path of the mallet, and `seen` the observed puck. */
 const PATHS = ["puck", "mallet", "commanded", "seen"] as const;
 
 /** Parses `#t=37&cam=side&flat=1&speed=0.5`; unknown fields and bad values are ignored. */

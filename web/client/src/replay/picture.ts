@@ -26,12 +26,12 @@ export interface PictureTexts {
 
 interface PictureOptions {
   readonly title: string;
-  /** Sides of a game, for the score. */
+  /** Names of the sides of a game, for the score. */
   readonly names: SideNames;
   readonly prefersReducedMotion: boolean;
   /** Called when the picture must be redrawn. */
   readonly changed: () => void;
-  /** Called after a change of the view. */
+  /** Called after a change between the 3-D and the flat view. */
   readonly switched: () => void;
   /** Called after a click that was no drag. */
   readonly clicked: () => void;

@@ -33,7 +33,7 @@ export interface ViewerOptions {
   readonly source: Source;
   /** Steps of a game; null for an episode, whose clip contains the number. */
   readonly steps: number | null;
-  /** Sides of a game. */
+  /** Names of the sides of a game. */
   readonly names: SideNames;
   /** Why the episode ended, in plain words; null if the page does not know it. */
   readonly outcome: string | null;

@@ -3,7 +3,9 @@
 import type { Palette } from "../replay/palette";
 import type { Series } from "./series";
 
+/** Pattern of the limit's line: lengths of dash and gap, pixels. */
 const DASHES = [4, 3];
+/** The pattern of a line without gaps. */
 const SOLID: number[] = [];
 const PADDING_PX = 4;
 

@@ -27,7 +27,7 @@ export interface Series {
   readonly unit: string;
   readonly lines: readonly Line[];
   readonly limit: number;
-  /** The allowed side of the limit. */
+  /** The side of the limit on which values are allowed. */
   readonly allowed: "above" | "below";
   /** Recorded violations as ranges of samples, inclusive. */
   readonly violations: readonly { readonly from: number; readonly to: number }[];

@@ -11,6 +11,7 @@ export const BASE_BODY = 0;
 export const MALLET_BODY = 8;
 export const BODY_COUNT = 9;
 
+/** Colours of an arm's parts. */
 export interface ArmPaint {
   readonly link: Paint;
   readonly joint: Paint;

@@ -10,6 +10,7 @@ const OPACITY = 0.42;
 /** Height at which a mallet has lost its contact shadow, m. */
 const VANISHING_HEIGHT_M = 0.08;
 const SHADOW_Z_M = 0.001;
+/** The puck and two mallets. */
 const MAX_OBJECTS = 3;
 
 /** The shadows of the puck and up to two mallets, drawn with a single call. They remain when cast shadows are switched off. */

@@ -9,9 +9,9 @@ import { PuckModel } from "./puck";
 import { Ribbon } from "./ribbon";
 import { FLOOR_Z_M } from "./room";
 
-/** Above the contact shadows, below the trails of the first replay. */
+/** Order of drawing of the ghost's trails: above the contact shadows, below the trails of the first replay. */
 const TRAIL_ORDER = 1.5;
-/** After all trails, which are seen through it. */
+/** That of the ghost's arm and puck: after all trails, which are seen through them. */
 const BODY_ORDER = 10;
 
 /** Arm, puck and trails of another replay: translucent, in a colour of their own. */

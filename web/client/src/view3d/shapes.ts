@@ -13,6 +13,7 @@ import {
 /** A point of a profile: distance from the axis, and position along it. */
 export type ProfilePoint = readonly [radius: number, along: number];
 
+/** Steps of which a rounded edge is made. */
 const ROUND_STEPS = 3;
 
 /** A shape about z from its profile, which runs from low to high z. */

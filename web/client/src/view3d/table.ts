@@ -29,7 +29,9 @@ import { arc, ball, drum, mark, sheet } from "./shapes";
 
 /** Height for drawing only, m: high enough to be visible, low enough not to hide the puck. */
 const RIM_HEIGHT_M = 0.03;
+/** Radius of the rims' rounded upper edges. */
 const RIM_ROUND_M = 0.007;
+/** Height of the table's body below the playing surface. */
 const APRON_HEIGHT_M = 0.1;
 const LINE_WIDTH_M = 0.007;
 const LINE_Z_M = 0.0004;

@@ -20,7 +20,7 @@ const FIELD_OF_VIEW_DEG = 28;
 /** Least width of a trail on the screen at its new end. */
 const LEAST_TRAIL_PIXELS = 3;
 
-/** Table, puck and arms in 3-D. The constructor throws without WebGL 2. */
+/** Table, puck and arms in 3-D. The constructor throws in a browser without WebGL 2. */
 export class View3D implements View {
   readonly canvas: HTMLCanvasElement;
   readonly orbit: Orbit;

@@ -32,7 +32,7 @@ impl StageDecision {
             Self::Freeze(_) => DecisionPreview {
                 title: format!("Freeze the boards of {name}"),
                 effects: "The boards will keep their current results, with a notice, until you unfreeze them. Evaluations will \
-                          go on; later results will be visible to organisers only."
+                          go on; later results will be visible to organisers and, over the API, to their own team only."
                     .to_owned(),
                 reason_readers: Some(PUBLIC_REASON),
                 button: "Freeze the boards",

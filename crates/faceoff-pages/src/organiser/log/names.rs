@@ -110,7 +110,8 @@ impl Names {
             (Some(("person", _)), None) => "A former user".to_owned(),
             (Some(_), None) => "A team".to_owned(),
             (None, None) => match event.actor.as_str() {
-                "organiser" => "The administrator of the host".to_owned(),
+                // The operator's token, which belongs to no account.
+                "organiser" => "The operator".to_owned(),
                 "visitor" => "A visitor".to_owned(),
                 other => format!("The {other}"),
             },

@@ -125,8 +125,8 @@ fn about_teams(event_text: &EventText<'_>, names: &Names) -> Option<String> {
         "team_described" => format!("changed the description of {subject}"),
         "team_made_baseline" => format!("made {subject} a reference agent"),
         "team_made_ranked" => format!("made {subject} a ranked team"),
-        "team_retired" => format!("withdrew the team {subject}"),
-        "team_returned" => format!("brought the team {subject} back"),
+        "team_retired" => format!("retired the team {subject} from the season"),
+        "team_returned" => format!("brought the retired team {subject} back"),
         "team_disqualified" => format!("disqualified {subject}"),
         "team_reinstated" => format!("reinstated {subject}"),
         "asked" => {
@@ -184,7 +184,7 @@ fn about_evaluations(event_text: &EventText<'_>, names: &Names) -> Option<String
                 .get("score")
                 .and_then(Value::as_f64);
             let score = score.map(crate::format::one_decimal).unwrap_or_default();
-            format!("finished {subject} with {score} %")
+            format!("finished {subject} with a score of {score} %")
         }
         "evaluation_agent_failed" => format!("stopped {subject} after agent faults"),
         "evaluation_platform_failed" => format!("gave up {subject} after a platform fault"),
@@ -217,12 +217,17 @@ fn about_evaluations(event_text: &EventText<'_>, names: &Names) -> Option<String
         "proposal_played" => format!("finished {subject}"),
         "proposal_applied" => format!("applied {subject}"),
         "proposal_dropped" => format!("dropped {subject}"),
-        "shard_committed" => format!(
-            "finished episodes {} to {} of {} in {subject}",
-            event_text.field("first_episode"),
-            event_text.field("end_episode"),
-            event_text.field("task")
-        ),
+        "shard_committed" => {
+            let number = |field: &str| event_text.event.details.get(field).and_then(Value::as_u64);
+            let first = number("first_episode").unwrap_or_default();
+            let end = number("end_episode").unwrap_or_default();
+            // Episodes are numbered from 0, and the event's end is exclusive.
+            format!(
+                "finished episodes {first} to {} of {} in {subject}",
+                end.saturating_sub(1),
+                event_text.field("task")
+            )
+        }
         "unit_given_back" => format!("gave a job of {subject} back to the queue"),
         _ => return None,
     })
@@ -295,7 +300,7 @@ fn about_tournaments(event_text: &EventText<'_>, names: &Names) -> Option<String
             let teams: Vec<&str> = teams.filter_map(|id| names.team(id)).collect();
             format!("entered {} for {subject}", teams.join(", "))
         }
-        "team_out" => format!("left {} out of {subject}", team()),
+        "team_out" => format!("removed {} from {subject} before its first round", team()),
         "team_left_tournament" => {
             format!(
                 "removed {} from {subject} from round {} on",
@@ -310,11 +315,11 @@ fn about_tournaments(event_text: &EventText<'_>, names: &Names) -> Option<String
         ),
         "round_over" => format!("ended round {} of {subject}", event_text.field("round")),
         "replays_ordered" => format!(
-            "queued {} to replay {subject}",
+            "queued {} to repeat the schedule of {subject}",
             event_text.count("games", "game")
         ),
         "replays_cancelled" => format!(
-            "cancelled {} that replay {subject}",
+            "cancelled {} that repeat the schedule of {subject}",
             event_text.count("games", "game")
         ),
         "free_game_queued" => match names.team(&event_text.field("opponent")) {
@@ -323,7 +328,7 @@ fn about_tournaments(event_text: &EventText<'_>, names: &Names) -> Option<String
         },
         "game_begun" => format!("started {subject}"),
         "game_played" => format!("finished {subject}"),
-        "game_broken" => format!("gave up {subject}"),
+        "game_broken" => format!("gave up {subject} after platform faults"),
         "game_voided" => format!("voided {subject}"),
         "game_queued_again" => format!("queued {subject} once more"),
         "game_cancelled" => format!("cancelled {subject}"),
@@ -381,7 +386,14 @@ mod tests {
                 "evaluation:4",
                 "evaluation_finished",
                 json!({ "score": 52.34, "dataset_blake3": "00" }),
-                "The server finished AiRLIHockey’s evaluation of 2026-03-01 with 52.3 %",
+                "The server finished AiRLIHockey’s evaluation of 2026-03-01 with a score of 52.3 %",
+            ),
+            (
+                "server",
+                "evaluation:4",
+                "shard_committed",
+                json!({ "first_episode": 20, "end_episode": 40, "task": "hit" }),
+                "The server finished episodes 20 to 39 of hit in AiRLIHockey’s evaluation of 2026-03-01",
             ),
             (
                 "visitor",
@@ -402,7 +414,7 @@ mod tests {
                 "season",
                 "something_new",
                 json!({}),
-                "The administrator of the host recorded “something new” for the season",
+                "The operator recorded “something new” for the season",
             ),
         ] {
             let event = event(actor, subject, kind, &details);

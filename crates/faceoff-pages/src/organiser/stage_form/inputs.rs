@@ -148,13 +148,13 @@ pub(super) static GROUPS: [InputGroup; 4] = [
     },
     InputGroup {
         legend: "Rules",
-        hint: "new rules start a new revision with its own board",
+        hint: "a change of an open stage starts a new revision with its own, empty board",
         has_tasks: true,
         inputs: &[
             Input {
                 name: "profile",
                 label: "Perturbations",
-                hint: "",
+                hint: "differences from the simulator that teams have",
                 kind: InputKind::ProfileChoice,
                 text: |stage| stage.rules.rules.profile.to_string(),
                 read: |form, patch| parse(form, "profile", &mut patch.profile),
@@ -172,7 +172,7 @@ pub(super) static GROUPS: [InputGroup; 4] = [
             Input {
                 name: "max_faults",
                 label: "Faults allowed",
-                hint: "",
+                hint: "agent faults (crashes, invalid or missing answers) in an evaluation; with more, there is no score",
                 kind: InputKind::Number(0),
                 text: |stage| stage.rules.rules.max_faults.to_string(),
                 read: |form, patch| parse_number(form, "max_faults", &mut patch.max_faults),
@@ -204,7 +204,8 @@ mean_of_last:5: the mean of the last 5 days",
             Input {
                 name: "ablation_episodes",
                 label: "Ablation episodes",
-                hint: "per task and profile; 0: none",
+                hint: "per task and profile, of the ablation (a trial run under each perturbation alone) of each new submission at a \
+scheduled cutoff; 0: no ablations",
                 kind: InputKind::Number(0),
                 text: |stage| stage.settings.ablation_episodes.to_string(),
                 read: |form, patch| {

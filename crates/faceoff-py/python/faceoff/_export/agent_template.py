@@ -18,7 +18,9 @@ TASK: str = "defend"
 ACTION_MODE: str = "delta"
 INTERPOLATION: int | None = 1
 CLIP_ACTIONS: bool = False
+# The speed of an action of 1, if actions are mallet velocities.
 MALLET_SPEED_M_S: float | None = None
+# Number of the last observations that the policy gets.
 FRAMES: int = 1
 
 

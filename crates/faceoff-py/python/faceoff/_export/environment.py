@@ -35,7 +35,7 @@ TRANSPARENT = {
     ),
     "stable_baselines3": ("Monitor", "VecCheckNan", "VecMonitor", "VecVideoRecorder"),
 }
-#: Vector environments whose worlds are in other processes.
+#: What to do about a vector environment whose worlds are in other processes.
 SUBPROCESSES = "pass env=, one such environment with the same wrappers in this process"
 #: What to do about a wrapper whose effect is unknown.
 CURE = "put what it does into the policy, and pass env=, the environment below this wrapper"
@@ -108,33 +108,34 @@ def read_environment(env: Any, task: object = None) -> PolicyEnvironment:
     observation_steps: list[Step] = []
     action_steps: list[Step] = []
     mallet: MalletPlane | MalletPlaneVector | None = None
+    # Number of stacked observations, and the name of the wrapper that stacks them, "" without one.
     frames, stack = 1, ""
-    layer = env
-    while not isinstance(layer, (AirHockeyEnv, AirHockeyVectorEnv)):
-        read = _read_layer(layer)
-        if isinstance(layer, (MalletPlane, MalletPlaneVector)):
-            mallet = layer
-        elif read.action_steps and mallet is not None:
-            raise ArgumentError(f"env: expected no {_name(layer)} below {_name(mallet)}: put it above, or leave it out")
-        if stack and (read.observation_steps or read.frames > 1):
-            raise ArgumentError(f"env: expected no {_name(layer)} below {stack}: put it above, or leave it out")
-        if read.frames > 1:
-            frames, stack = read.frames, _name(layer)
-        observation_steps = [*read.observation_steps, *observation_steps]
-        action_steps += read.action_steps
-        layer = read.inner
-    own = AirHockeyEnv if isinstance(layer, AirHockeyEnv) else AirHockeyVectorEnv
-    if type(layer).step is not own.step or type(layer).reset is not own.reset:
-        raise ArgumentError(f"env: expected an {own.__name__}, got {_name(layer)} with a step or reset of its own: {CURE}")
-    if task is not None and one_of("task", task, TASKS) != layer.task:
-        raise ArgumentError(f"task: expected {layer.task}, the task of env, got {task!r}")
+    # From here on `env` is the environment that is read next; at the end it is the world.
+    while not isinstance(env, (AirHockeyEnv, AirHockeyVectorEnv)):
+        layer = _read_layer(env)
+        if isinstance(env, (MalletPlane, MalletPlaneVector)):
+            mallet = env
+        elif layer.action_steps and mallet is not None:
+            raise ArgumentError(f"env: expected no {_name(env)} below {_name(mallet)}: put it above, or leave it out")
+        if stack and (layer.observation_steps or layer.frames > 1):
+            raise ArgumentError(f"env: expected no {_name(env)} below {stack}: put it above, or leave it out")
+        if layer.frames > 1:
+            frames, stack = layer.frames, _name(env)
+        observation_steps = [*layer.observation_steps, *observation_steps]
+        action_steps += layer.action_steps
+        env = layer.inner
+    own = AirHockeyEnv if isinstance(env, AirHockeyEnv) else AirHockeyVectorEnv
+    if type(env).step is not own.step or type(env).reset is not own.reset:
+        raise ArgumentError(f"env: expected an {own.__name__}, got {_name(env)} with a step or reset of its own: {CURE}")
+    if task is not None and one_of("task", task, TASKS) != env.task:
+        raise ArgumentError(f"task: expected {env.task}, the task of env, got {task!r}")
     return PolicyEnvironment(
-        task=layer.task,
-        action_mode=layer.action_mode,
-        interpolation=layer.interpolation,
-        clip_actions=layer.clip_actions,
-        observation_space=_single_space(layer, "observation_space"),
-        action_space=_single_space(layer if mallet is None else mallet, "action_space"),
+        task=env.task,
+        action_mode=env.action_mode,
+        interpolation=env.interpolation,
+        clip_actions=env.clip_actions,
+        observation_space=_single_space(env, "observation_space"),
+        action_space=_single_space(env if mallet is None else mallet, "action_space"),
         mallet_speed_m_s=None if mallet is None else mallet.max_speed_m_s,
         observation_steps=observation_steps,
         action_steps=action_steps,
@@ -162,18 +163,18 @@ def _read_layer(env: Any) -> Layer:
         )
     if isinstance(env, (MalletPlane, MalletPlaneVector)) or is_transparent(env):
         return Layer(env.env)
-    if _is_one_of(env, "NormalizeObservation"):
+    if _is_gymnasium_wrapper(env, "NormalizeObservation"):
         statistics: Any = env
         rms = statistics.obs_rms
         return Layer(env.env, normalise(rms.mean, rms.var, statistics.epsilon, None))
-    if _is_one_of(env, "FlattenObservation") and len(_single_space(env.env, "observation_space").shape) == 1:
+    if _is_gymnasium_wrapper(env, "FlattenObservation") and len(_single_space(env.env, "observation_space").shape) == 1:
         return Layer(env.env)
     inner = _single_space(env.env, "action_space")
-    if _is_one_of(env, "ClipAction"):
+    if _is_gymnasium_wrapper(env, "ClipAction"):
         return Layer(env.env, action_steps=clip(inner.low, inner.high))
-    if _is_one_of(env, "RescaleAction"):
+    if _is_gymnasium_wrapper(env, "RescaleAction"):
         return Layer(env.env, action_steps=_rescale(_single_space(env, "action_space"), inner))
-    if _is_one_of(env, "TransformObservation") or _is_one_of(env, "TransformAction"):
+    if _is_gymnasium_wrapper(env, "TransformObservation") or _is_gymnasium_wrapper(env, "TransformAction"):
         raise ArgumentError(f"env: expected wrappers that can be read, got {_name(env)} with a function: {CURE}")
     raise ArgumentError(f"env: expected wrappers that can be exported, got {_name(env)}: {CURE}")
 
@@ -192,8 +193,8 @@ def is_transparent(env: Any) -> bool:
     return False
 
 
-def _is_one_of(env: Any, name: str) -> bool:
-    """Whether an object's class is the wrapper of this name in Gymnasium, for one world or for many."""
+def _is_gymnasium_wrapper(env: Any, name: str) -> bool:
+    """Whether an environment is the wrapper of this name in Gymnasium, for one world or for many."""
     return type(env).__name__ == name and type(env).__module__.startswith("gymnasium.")
 
 

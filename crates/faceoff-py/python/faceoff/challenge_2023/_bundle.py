@@ -24,8 +24,9 @@ PROGRAM = "play_2023.py"
 
 #: Parts of this package for the bundle. They need only NumPy.
 _PARTS = ("__init__.py", "_folders.py", "agent.py", "errors.py", "kinematics", "challenge_2023")
-#: Folders that are not part of an agent; the package of 2023 would hide its substitute.
+#: Folders that are not part of an agent.
 _LEFT_OUT = ("__pycache__", ".git")
+#: The package of 2023, which is left out, too: it would hide its substitute.
 _REPLACED = "air_hockey_challenge"
 
 _PROGRAM_TEXT = f'''"""Plays the agent of 2023 in the folder `{TEAM_FOLDER}`."""

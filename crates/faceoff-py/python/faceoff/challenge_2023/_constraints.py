@@ -157,6 +157,7 @@ class LinkConstraint(Constraint):
         return _of_positions(-np.stack(heights))
 
 
+# Derivatives of 14 values: distances beyond the upper limits grow with a joint's value, those beyond the lower ones fall.
 _UP_AND_DOWN = np.vstack([np.eye(model.JOINTS), -np.eye(model.JOINTS)])
 
 

@@ -23,6 +23,7 @@ from faceoff.kinematics import model
 ENV_NAMES = {"hit": "7dof-hit", "defend": "7dof-defend", "prepare": "7dof-prepare", "tournament": "tournament"}
 """The protocol's tasks, and the names of their environments in 2023."""
 
+#: Lists of indices of an observation, which are copied from `env`.
 _IDS = ("puck_pos_ids", "puck_vel_ids", "joint_pos_ids", "joint_vel_ids", "opponent_ee_ids")
 _LIMITS = ("joint_pos_limit", "joint_vel_limit", "joint_acc_limit")
 # Discount that the environments of 2023 announced, whatever an agent used.

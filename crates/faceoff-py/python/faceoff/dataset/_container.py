@@ -197,6 +197,7 @@ class Container:
 
 
 def _hasher() -> Any:
+    """The class `blake3.blake3`, or None if that package is not installed."""
     try:
         from blake3 import blake3  # type: ignore[import-not-found,unused-ignore]
     except ImportError:

@@ -199,7 +199,7 @@ class Dataset:
         return to_polars(self.table(table, task=task, columns=columns))
 
     def rows(self, episode: Episode, columns: Sequence[str] | None) -> pa.Table:
-        """The control steps of an episode of this dataset: `Episode.table`."""
+        """The control steps of an episode of this dataset, a row each. `Episode.table` calls it."""
         row_index = self._row_indices[episode.task, episode.index]
         return self._read_steps(int(self._offsets[row_index]), episode.steps, columns)
 

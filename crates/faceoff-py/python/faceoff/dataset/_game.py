@@ -235,7 +235,7 @@ class Game:
         return to_polars(self.table(name, columns))
 
     def rally_rows(self, rally: Rally, name: str, columns: Sequence[str] | None) -> pa.Table:
-        """The control steps of a rally of this game: `Rally.table`."""
+        """The control steps of a rally of this game, a row each. `Rally.table` calls it."""
         names = ["motion", *(f"side-{side}" for side in self.sides)]
         if name not in names:
             raise ArgumentError(f"name: expected one of {', '.join(names)}, got {name!r}")

@@ -139,6 +139,7 @@ def _violations(episodes: list[Episode]) -> dict[str, Any]:
 
 
 def _slow_message(mean_s: float, max_s: float) -> str | None:
+    """The message of 2023 about the slowness that costs most; None if the answers were fast enough."""
     if max_s > 0.2:
         return "max computation_time > 0.2s"
     if mean_s > 0.02:

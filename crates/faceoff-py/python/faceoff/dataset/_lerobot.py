@@ -157,6 +157,7 @@ def _schema(features: Mapping[str, dict[str, Any]]) -> pa.Schema:
 
 
 def _frames(episode: Episode, number: int, first: int, reward: Reward) -> Frames:
+    """The columns of an episode with this number in the export, whose first frame has the index `first` there."""
     arrays = episode.to_numpy()
     steps = episode.steps
     observations = arrays.observations[:-1].astype(np.float32)

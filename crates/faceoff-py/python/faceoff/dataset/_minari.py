@@ -153,6 +153,7 @@ def _find_task(dataset: Dataset, dataset_id: str, task: str | None) -> str:
 
 
 def _buffer(buffer_class: Any, episode: Episode, reward: Reward, scalar: type[Any]) -> Any:
+    """An episode as Minari's class of buffers; observations and actions are of NumPy's type `scalar`."""
     arrays = episode.to_numpy()
     steps = episode.steps
     flags = np.zeros((2, steps), dtype=bool)

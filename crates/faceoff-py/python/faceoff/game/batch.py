@@ -1,4 +1,4 @@
-"""Games stepped together by the native half, for all environments of this package."""
+"""Games stepped together by the native half (compiled from Rust), for all environments of `faceoff.game`."""
 
 from __future__ import annotations
 
@@ -97,14 +97,14 @@ class GameArguments:
 
 
 @dataclass
-class GameRows:
-    """Results of a step. Pairs have robot 1 first."""
+class GameResults:
+    """The arrays of a step's results, with a row per game, which the native half writes. Pairs have robot 1 first."""
 
     #: (games, 2, 23), float32.
     observations: Observation
-    #: (games, 2, 23), float32: last observations of games whose successor has begun in the same step.
+    #: (games, 2, 23), float32: the last observations of games that ended in this step, where it also began the next game.
     final_observations: Observation
-    #: (games, 23): see the properties below.
+    #: (games, 23): numbers about each game, such as its score, which the properties below name.
     facts: Floats
     #: (games, 40): true states after the step.
     states: Floats
@@ -112,7 +112,7 @@ class GameRows:
     rewards: Floats
 
     @classmethod
-    def make(cls, games: int) -> GameRows:
+    def make(cls, games: int) -> GameResults:
         """Zeroed arrays."""
         return cls(
             np.zeros((games, 2, 23), np.float32),
@@ -202,7 +202,7 @@ class GameBatch:
         self.arguments = arguments
         self.games = games
         #: Overwritten by each step and reset; environments hand out copies, so that callers may change them.
-        self.rows = GameRows.make(games)
+        self.results = GameResults.make(games)
         self._threads = threads
         self._autoreset = autoreset
         self._native: _native.Games | None = self._new_native()
@@ -224,34 +224,34 @@ class GameBatch:
 
     def reset(self, mask: Bools, seeds: Sequence[int | None]) -> None:
         """Begins the games of the mask: the first one of a seed, or the next one of the last seed."""
-        self.native.reset(mask, list(seeds), self.rows.arrays())
-        self.rows.rewards[mask] = 0.0
+        self.native.reset(mask, list(seeds), self.results.arrays())
+        self.results.rewards[mask] = 0.0
 
     def step(self, actions: Sequence[Floats | None]) -> None:
         """One control step; actions of both robots, (games, n) each, or None if that robot's arm holds."""
-        native, rows = self.native, self.rows
-        before = rows.observations
+        native, results = self.native, self.results
+        before = results.observations
         if self.arguments.reward is not default_reward:
             before = before.copy()
-        native.step(list(actions), rows.arrays())
-        rows.rewards = self._rewards(before)
+        native.step(list(actions), results.arrays())
+        results.rewards = self._rewards(before)
 
     def _rewards(self, before: Observation) -> Floats:
-        rows = self.rows
-        started = rows.steps == 0
-        after = rows.observations
+        results = self.results
+        started = results.steps == 0
+        after = results.observations
         if self._autoreset == "same_step":
-            after = np.where(rows.is_over[:, None, None], rows.final_observations, after)
+            after = np.where(results.is_over[:, None, None], results.final_observations, after)
         transition = GameTransition(
             observations=before,
             next_observations=after,
-            puck=rows.states[:, :6].copy(),
-            robots=rows.states[:, 6:].reshape(-1, 2, 17).copy(),
-            constraints=rows.constraints,
-            rally_end=rows.rally_ends,
-            by=rows.by,
-            points=rows.points,
-            diverged=rows.diverged,
+            puck=results.states[:, :6].copy(),
+            robots=results.states[:, 6:].reshape(-1, 2, 17).copy(),
+            constraints=results.constraints,
+            rally_end=results.rally_ends,
+            by=results.by,
+            points=results.points,
+            diverged=results.diverged,
         )
         rewards = self._call_reward(transition)
         rewards[started] = 0.0
@@ -278,10 +278,11 @@ class GameBatch:
         is_open, saved = state.pop("_is_open"), state.pop("_saved")
         self.__dict__.update(state)
         self._native = self._new_native() if is_open else None
-        kept, self.rows = self.rows, GameRows.make(self.games)
+        pickled, self.results = self.results, GameResults.make(self.games)
         for game, snapshot in enumerate(saved):
-            self.native.restore(game, snapshot, self.rows.arrays())
-        self.rows.rewards = kept.rewards
+            self.native.restore(game, snapshot, self.results.arrays())
+        # A snapshot has no rewards.
+        self.results.rewards = pickled.rewards
 
 
 class SingleGameBatch(GameBatch):

@@ -128,17 +128,17 @@ class AirHockeyGame(ParallelEnv[str, Observation, Any]):  # type: ignore[misc]
             raise OrderError("step: expected a game under way, got one that has ended: call reset() first")
         checked = self._check_actions(actions)
         batch.step(checked)
-        rows = batch.rows
-        is_over = bool(rows.steps[0] >= batch.arguments.max_steps)
+        results = batch.results
+        is_over = bool(results.steps[0] >= batch.arguments.max_steps)
         live = self.agents
-        terminations = {agent: bool(rows.diverged[0, AGENTS.index(agent)]) for agent in live}
+        terminations = {agent: bool(results.diverged[0, AGENTS.index(agent)]) for agent in live}
         truncations = {agent: is_over and not terminations[agent] for agent in live}
         infos = {agent: self._info(AGENTS.index(agent)) for agent in live}
         self.agents = [agent for agent in live if not (terminations[agent] or truncations[agent])]
         self._render_human()
         return (
             self._observations_of(live),
-            {agent: float(rows.rewards[0, AGENTS.index(agent)]) for agent in live},
+            {agent: float(results.rewards[0, AGENTS.index(agent)]) for agent in live},
             terminations,
             truncations,
             infos,
@@ -161,20 +161,20 @@ class AirHockeyGame(ParallelEnv[str, Observation, Any]):  # type: ignore[misc]
         ]
 
     def _observations_of(self, agents: Sequence[str]) -> dict[str, Observation]:
-        observations = self._batch.rows.observations[0]
+        observations = self._batch.results.observations[0]
         return {agent: observations[AGENTS.index(agent)].copy() for agent in agents}
 
     def _info(self, robot: int) -> dict[str, Any]:
-        rows = self._batch.rows
+        results = self._batch.results
         info: dict[str, Any] = {
-            "constraints": rows.constraints[0, robot],
-            "score": tuple(rows.score[0].tolist()),
-            "goals": tuple(rows.goals[0].tolist()),
-            "fouls": tuple(rows.fouls[0].tolist()),
+            "constraints": results.constraints[0, robot],
+            "score": tuple(results.score[0].tolist()),
+            "goals": tuple(results.goals[0].tolist()),
+            "fouls": tuple(results.fouls[0].tolist()),
         }
-        if rows.rally_ended[0]:
-            info["rally_end"] = rows.rally_ends[0]
-            info["rally_end_by"] = agent_of(int(rows.by[0]))
+        if results.rally_ended[0]:
+            info["rally_end"] = results.rally_ends[0]
+            info["rally_end_by"] = agent_of(int(results.by[0]))
         return info
 
     @exclusive

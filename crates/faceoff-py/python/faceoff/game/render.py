@@ -17,8 +17,9 @@ def draw_game(state: Sequence[float]) -> npt.NDArray[np.uint8]:
     """A picture of a game's true state, (40,), from above: (360, 640, 3) uint8."""
     from faceoff.gym.render import draw
 
+    # A game's state has the puck (6) and 17 numbers for each robot; `draw` takes the state of a task's world. Both have
+    # the puck, and the end effectors of robot 1 and robot 2.
     array = np.zeros(_native.STATE_LEN)
-    # The puck, and the end effectors of robot 1 and robot 2.
     array[:6], array[27:30], array[30:33] = state[:6], state[20:23], state[37:40]
     return draw(State(array), has_opponent=True)
 

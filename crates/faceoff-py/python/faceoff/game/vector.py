@@ -29,7 +29,7 @@ Step = tuple[Observation, Floats, Bools, Bools, dict[str, Any]]
 
 
 class _GameVectorEnv(VectorEnv[Any, Any, Any]):
-    """What both environments share: rows of observations, each of one robot in one game.
+    """What both environments share. A *row* of their observations, actions and infos is one robot in one game.
 
     A game ends after ``max_steps`` (truncated), or when a robot's commands make the world diverge: terminated for that
     robot, truncated for the other.
@@ -56,7 +56,7 @@ class _GameVectorEnv(VectorEnv[Any, Any, Any]):
         self.autoreset_mode = read_autoreset_mode(autoreset_mode)
         if render_mode is not None:
             one_of("render_mode", render_mode, ["rgb_array"])
-        # A game is long enough to pay for a thread.
+        # A step of one game is enough work for a thread.
         count = min(available_cpus(), games) if threads is None else integer("threads", threads, 1, 1024)
         self.copy = flag("copy", copy)
         self.render_mode = render_mode
@@ -76,17 +76,19 @@ class _GameVectorEnv(VectorEnv[Any, Any, Any]):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
 
-    def _observations(self, rows: Observation) -> Observation:
+    def _rows_of(self, observations: Observation) -> Observation:
+        """The rows (num_envs, 23) of observations of both robots, (games, 2, 23)."""
         raise NotImplementedError
 
     def _check(self) -> None:
-        """Called before a step or reset, so that what is refused changes nothing."""
+        """Refuses a pool that cannot play. Called before a step or reset, so that a refusal changes nothing."""
 
     def _games_begin(self, games: Bools, numbers_of_games: npt.NDArray[np.int64]) -> dict[str, Any]:
         """Called when games begin; returns infos about them, without masks."""
         return {}
 
     def _actions_of_both(self, actions: Any) -> Sequence[Floats]:
+        """The actions of robot 1 and of robot 2 in all games, (games, n) each, from those of the rows."""
         raise NotImplementedError
 
     # --- reset -------------------------------------------------------------------------------------------------
@@ -118,11 +120,11 @@ class _GameVectorEnv(VectorEnv[Any, Any, Any]):
         origins = np.array(batch.native.origins(), np.uint64).astype(np.int64)
         self._seeds = origins[:, 0].copy()
         infos = self._start_infos(is_reset, origins[:, 1])
-        return self._result(batch.rows.observations), infos
+        return self._returned_observations(batch.results.observations), infos
 
-    def _result(self, rows: Observation) -> Observation:
-        observations = self._observations(rows)
-        return observations.copy() if self.copy else observations
+    def _returned_observations(self, observations: Observation) -> Observation:
+        rows = self._rows_of(observations)
+        return rows.copy() if self.copy else rows
 
     def _read_mask(self, options: object) -> Bools:
         if options is None:
@@ -138,12 +140,13 @@ class _GameVectorEnv(VectorEnv[Any, Any, Any]):
 
     def _start_infos(self, begun: Bools, numbers_of_games: npt.NDArray[np.int64]) -> dict[str, Any]:
         values = {"seed": self._seeds, "game_number": numbers_of_games, **self._games_begin(begun, numbers_of_games)}
-        rows = begun[self._game_of]
+        begun_rows = begun[self._game_of]
         infos: dict[str, Any] = {}
         for name, value in values.items():
             of_rows = value[self._game_of]
-            infos[name] = np.where(rows, of_rows, 0) if of_rows.dtype.kind in "iu" else np.where(rows, of_rows, None)
-            infos[f"_{name}"] = rows.copy()
+            is_whole = of_rows.dtype.kind in "iu"
+            infos[name] = np.where(begun_rows, of_rows, 0) if is_whole else np.where(begun_rows, of_rows, None)
+            infos[f"_{name}"] = begun_rows.copy()
         return infos
 
     # --- step --------------------------------------------------------------------------------------------------
@@ -159,18 +162,18 @@ class _GameVectorEnv(VectorEnv[Any, Any, Any]):
         batch.native  # noqa: B018 - the error about a closed environment comes first
         self._check()
         batch.step(self._actions_of_both(actions))
-        rows = batch.rows
-        is_over, is_new = rows.is_over, rows.steps == 0
-        diverged = rows.diverged[self._game_of, self._robot_of]
+        results = batch.results
+        is_over, is_new = results.is_over, results.steps == 0
+        diverged = results.diverged[self._game_of, self._robot_of]
         terminated = diverged & is_over[self._game_of]
         truncated = is_over[self._game_of] & ~terminated
-        rewards = rows.rewards[self._game_of, self._robot_of]
+        rewards = results.rewards[self._game_of, self._robot_of]
         has_step = ~is_new
         infos: dict[str, Any] = {}
         if self.autoreset_mode.name == "SAME_STEP" and is_over.any():
             ended = is_over[self._game_of]
             finals = np.full(self.num_envs, None, object)
-            final_rows = self._observations(rows.final_observations)
+            final_rows = self._rows_of(results.final_observations)
             for row in np.flatnonzero(ended):
                 finals[row] = final_rows[row].copy()
             infos["final_obs"], infos["_final_obs"] = finals, ended.copy()
@@ -180,27 +183,28 @@ class _GameVectorEnv(VectorEnv[Any, Any, Any]):
         # The side and the opponent of a new game are drawn now, so its observations are taken afterwards.
         begun = is_new | is_over if self.autoreset_mode.name == "SAME_STEP" else is_new
         if begun.any():
-            infos |= self._start_infos(begun, rows.numbers + (is_over & begun))
-        return self._result(rows.observations), rewards, terminated, truncated, infos
+            # At its end a game's number is that of the ended one.
+            infos |= self._start_infos(begun, results.numbers + (is_over & begun))
+        return self._returned_observations(results.observations), rewards, terminated, truncated, infos
 
     def _step_infos(self, games: Bools) -> dict[str, Any]:
-        rows = self._batch.rows
+        results = self._batch.results
         present = games[self._game_of]
         infos: dict[str, Any] = {}
         if not present.any():
             return infos
         values = {
-            "constraints": rows.constraints[self._game_of, self._robot_of],
-            "score": rows.score[self._game_of],
-            "goals": rows.goals[self._game_of],
-            "fouls": rows.fouls[self._game_of],
+            "constraints": results.constraints[self._game_of, self._robot_of],
+            "score": results.score[self._game_of],
+            "goals": results.goals[self._game_of],
+            "fouls": results.fouls[self._game_of],
         }
         for name, value in values.items():
             value[~present] = 0
             infos[name], infos[f"_{name}"] = value, present.copy()
-        ended = rows.rally_ended & games
+        ended = results.rally_ended & games
         if ended.any():
-            ends, by = rows.rally_ends, rows.by
+            ends, by = results.rally_ends, results.by
             reasons, names = np.full((2, self.num_envs), None, object)
             of_rows = ended[self._game_of]
             for row in np.flatnonzero(of_rows):
@@ -230,7 +234,7 @@ class _GameVectorEnv(VectorEnv[Any, Any, Any]):
 
 
 class AirHockeyGameVectorEnv(_GameVectorEnv):
-    """Many games, in which the learner plays both sides: 2 × ``games`` rows.
+    """Many games, in which the learner plays both sides: 2 × ``games`` rows of observations and actions.
 
     Row 2i is robot 1 of game i, row 2i + 1 robot 2, each observed from its own side. Game i after ``reset(seed=s)``
     equals an :class:`AirHockeyGame` after ``reset(seed=s + i)`` bit for bit, until a robot makes the world diverge.
@@ -280,8 +284,8 @@ class AirHockeyGameVectorEnv(_GameVectorEnv):
         self._game_of = np.repeat(np.arange(count), 2)
         self._robot_of = np.tile(np.arange(2), count)
 
-    def _observations(self, rows: Observation) -> Observation:
-        return rows.reshape(-1, rows.shape[-1])
+    def _rows_of(self, observations: Observation) -> Observation:
+        return observations.reshape(-1, observations.shape[-1])
 
     def _actions_of_both(self, actions: Any) -> Sequence[Floats]:
         checked = numbers("actions", actions, self.action_space.shape)  # type: ignore[arg-type]
@@ -366,16 +370,17 @@ class SelfPlayVectorEnv(_GameVectorEnv):
             groups.setdefault(id(self._opponent_of[game]), []).append(game)
         return [(self._opponent_of[group[0]], np.array(group)) for group in groups.values()]
 
-    def _observations(self, rows: Observation) -> Observation:
+    def _rows_of(self, observations: Observation) -> Observation:
         if self._side == "random":
-            return rows[self._game_of, self._robot_of]
-        return rows[:, self._robot_of[0]]
+            return observations[self._game_of, self._robot_of]
+        # A view instead of a copy: all rows are the same robot.
+        return observations[:, self._robot_of[0]]
 
     def _actions_of_both(self, actions: Any) -> Sequence[Floats]:
         checked = numbers("actions", actions, self.action_space.shape)  # type: ignore[arg-type]
-        rows = self._batch.rows
+        results = self._batch.results
         # In this step the next game begins where one is over, without actions.
-        begins = rows.is_over & (self.autoreset_mode.name == "NEXT_STEP")
+        begins = results.is_over & (self.autoreset_mode.name == "NEXT_STEP")
         of_robots = [np.zeros((self.num_envs, length)) for length in self._action_lens]
         for robot, of_robot in enumerate(of_robots):
             own = self._robot_of == robot
@@ -383,5 +388,5 @@ class SelfPlayVectorEnv(_GameVectorEnv):
                 of_robot[own] = checked[own]
             for opponent, games in self._by_opponent(np.flatnonzero(~own & ~begins)):
                 name = f"actions of opponents[{self._index_of[games[0]]}]"
-                of_robot[games] = numbers(name, opponent(rows.observations[games, robot]), (len(games), of_robot.shape[1]))
+                of_robot[games] = numbers(name, opponent(results.observations[games, robot]), (len(games), of_robot.shape[1]))
         return of_robots

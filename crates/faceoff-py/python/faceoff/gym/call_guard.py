@@ -1,4 +1,4 @@
-"""Refuses concurrent calls of an environment's methods."""
+"""Refuses a call of an environment's method while another thread's call is under way."""
 
 from __future__ import annotations
 

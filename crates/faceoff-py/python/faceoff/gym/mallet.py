@@ -1,4 +1,4 @@
-"""Wrappers whose actions are mallet velocities instead of joint commands."""
+"""Wrappers of environments whose actions are mallet velocities in the plane of the table, instead of joint commands."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Arrays with a row per world, written by the native half."""
+"""The results of a step as arrays with a row per world (simulated table). The native half, compiled from Rust, writes them."""
 
 from __future__ import annotations
 

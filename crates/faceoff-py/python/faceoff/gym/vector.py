@@ -229,6 +229,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
         return self._rows.observations.copy(), self._rows.next_states.copy()
 
     def _rows_to_write(self) -> Rows:
+        """The arrays for the next results: with ``copy`` the earlier ones stay the caller's."""
         if self.copy:
             self._rows.renew()
         return self._rows

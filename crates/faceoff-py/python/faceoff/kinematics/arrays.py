@@ -1,4 +1,4 @@
-"""Checks and conversions of array arguments."""
+"""Checks and conversions of array arguments. The largest allowed number is that of `plain`, the module without NumPy."""
 
 from typing import Any
 

@@ -1,4 +1,7 @@
-"""The rules' constraints on the robot, and joint speeds relative to their limits."""
+"""The rules' constraints on the robot, and joint speeds relative to their limits.
+
+Constants come from `model`, and from `plain`, the kinematics in plain Python (without NumPy).
+"""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""Kinematics of the arm for one pose at a time, with the standard library alone.
+"""Kinematics of the arm for one pose at a time, in plain Python: with the standard library alone, without NumPy.
 
 Copy this file into a bundle: it needs no other file. `faceoff.kinematics` does the same for NumPy arrays.
 
@@ -80,7 +80,7 @@ JOINT_BOUND_RAD = tuple(
     )
     for joint, limit in enumerate(POSITION_LIMIT_RAD)
 )
-# Weight of each joint in least squares: a fast joint moves more.
+# Weight of each joint in least squares, (rad/s)²: a fast joint moves more.
 WEIGHT = tuple(limit * limit for limit in VELOCITY_LIMIT_RAD_S)
 
 Vector = tuple[float, float, float]
@@ -272,7 +272,11 @@ def _step(
     deficit: float,
     weight: Sequence[float],
 ) -> list[float]:
-    """One step towards the target; a low wrist is raised without moving the end effector."""
+    """One step towards the target; a low wrist is raised without moving the end effector.
+
+    `rows` are those of the Jacobian, `rise` the change of the wrist's height with each joint (m/rad), `error` the way
+    from the end effector to the target (m), `deficit` the height that the wrist lacks (m), `weight` that of each joint.
+    """
     step = _least_change(rows, error, weight)
     if deficit <= 0.0:
         return step

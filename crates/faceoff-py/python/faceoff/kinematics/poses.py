@@ -11,11 +11,11 @@ from .arrays import Floats, broadcast, joints, points
 
 _OFFSETS = np.array(model.LINK_OFFSET_M)
 _MOUNTS = np.array(model.LINK_MOUNT)
-# Of commanded joint positions, ± rad.
+# Bounds of commanded joint positions, ± rad.
 _BOUND = np.array(plain.JOINT_BOUND_RAD)
-# Of each joint in least squares: a fast joint moves more.
+# Weight of each joint in least squares: a fast joint moves more.
 _WEIGHT = np.array(model.VELOCITY_LIMIT_RAD_S) ** 2
-# The hand (from joint 6 to the end effector) from straight up in the start pose, rad.
+# Angle of the hand (from joint 6 to the end effector) from straight up in the start pose, rad.
 _HAND_START = plain.START_HAND_RAD
 # Lengths of the arm's three parts in its vertical plane, m.
 _UPPER, _FOREARM, _HAND = plain.UPPER_ARM_M, plain.FOREARM_M, plain.HAND_M
@@ -190,11 +190,14 @@ def _least_squares(point: Floats, q0: Floats) -> Floats:
         rows = _jacobian(origins, axes)
         rise = np.cross(axes, origins[:, 6:7] - origins[:, :7])[..., 2]
         step = _step(rows, rise, error, deficit, np.broadcast_to(_WEIGHT, pose.shape))
+        # Joints at their bound that the step would push further are excluded, and the step is computed once more.
         stuck = (np.abs(pose + step) > _BOUND) & (np.abs(pose) >= _BOUND) & (pose * step > 0.0)
         usable = np.where(stuck, 0.0, _WEIGHT)
-        again = stuck.any(axis=-1)
-        if again.any():
-            step[again] = _step(rows[again], rise[again], error[again], deficit[again], usable[again])
+        has_stuck = stuck.any(axis=-1)
+        if has_stuck.any():
+            step[has_stuck] = _step(
+                rows[has_stuck], rise[has_stuck], error[has_stuck], deficit[has_stuck], usable[has_stuck]
+            )
         length = np.sqrt(np.sum(step * step, axis=-1, keepdims=True))
         share = np.minimum(1.0, plain.STEP_LIMIT_RAD / np.maximum(length, 1e-300))
         q[active] = np.clip(pose + share * step, -_BOUND, _BOUND)
@@ -202,6 +205,7 @@ def _least_squares(point: Floats, q0: Floats) -> Floats:
 
 
 def _step(rows: Floats, rise: Floats, error: Floats, deficit: Floats, weight: Floats) -> Floats:
+    """One step of n poses, (n, 7), as in `plain`, which explains the arguments."""
     step = _least_change(rows, error, weight)
     desired = weight * rise
     moved = np.einsum("nij,nj->ni", rows, desired)

@@ -110,17 +110,17 @@ def setpoints(
     if interpolation not in INTERPOLATIONS:
         raise _unknown_interpolation(interpolation)
     shape = {1: (7,), 2: (7,), 5: (3, 7), None: (20, 3, 7)}.get(interpolation, (2, 7))
-    rows = finite("actions", actions)
-    if rows.shape[1:] != shape or rows.ndim == 0:
-        raise ValueError(f"actions: expected shape (n, {', '.join(map(str, shape))}), got {rows.shape}")
+    checked = finite("actions", actions)
+    if checked.shape[1:] != shape or checked.ndim == 0:
+        raise ValueError(f"actions: expected shape (n, {', '.join(map(str, shape))}), got {checked.shape}")
     state = np.zeros((3, model.JOINTS))
     for row, name, value in ((0, "q", q), (1, "dq", np.zeros(model.JOINTS) if dq is None else dq)):
         values = joints(name, value)
         if values.ndim != 1:
             raise ValueError(f"{name}: expected shape ({model.JOINTS},), got {values.shape}")
         state[row] = values
-    steps = np.empty((len(rows), model.SUBSTEPS, 3, model.JOINTS))
-    for k, action in enumerate(rows):
+    steps = np.empty((len(checked), model.SUBSTEPS, 3, model.JOINTS))
+    for k, action in enumerate(checked):
         steps[k] = _interpolate(interpolation, state, action)
         state = steps[k, -1]
     return steps
@@ -190,7 +190,10 @@ def _times(steps: int) -> Floats:
 
 
 def _path(ends: list[Floats], steps: int, t: Floats) -> tuple[Floats, Floats]:
-    """The mallet at times (m,), s: positions and velocities (m, 3)."""
+    """The mallet at times (m,), s: positions and velocities (m, 3).
+
+    `ends` are the start, the end, and the velocities there, (3,) each.
+    """
     start, end, v0, v1 = ends
     duration = steps * model.CONTROL_STEP_S
     s = (t / duration)[:, None]

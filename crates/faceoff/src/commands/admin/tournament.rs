@@ -149,7 +149,7 @@ pub(super) enum TournamentAction {
         /// The game's id
         game: GameId,
     },
-    /// Cancel an unfinished friendly or test game
+    /// Cancel a pending or running friendly or test game (teams: faceoff game cancel)
     CallOff {
         /// The game's id
         game: GameId,
