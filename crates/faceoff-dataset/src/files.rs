@@ -18,7 +18,7 @@ pub(crate) const CALIBRATION_FILE: &str = "calibration.json";
 pub(crate) const MANIFEST_FILE: &str = "manifest.json";
 /// Pack of clips for replays, in a shard's folder; stored beside the dataset, not in it.
 pub const CLIPS_FILE: &str = "clips";
-/// The end of the agent's standard error.
+/// The beginning and the end of the agent's standard error.
 pub(crate) const LOG_FILE: &str = "agent.log";
 /// The report of a shard, in its folder.
 pub(crate) const REPORT_FILE: &str = "report.json";

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub struct ShardReport {
     /// Outcome of each episode, in order.
     pub outcomes: Vec<EpisodeOutcome>,
-    /// The end of the agent's standard error, with its faults.
+    /// The beginning and the end of the agent's standard error, with its faults.
     pub log: String,
     /// Did the agent exceed the allowed number of faults, so that the remaining episodes were not run?
     pub stopped_by_faults: bool,

@@ -33,7 +33,6 @@ pub(crate) async fn list_announcements(
 /// Publishes an announcement. It cannot be changed or removed.
 #[utoipa::path(
     post, path = "/announcements", tag = "organiser", security(("organiser" = [])), request_body = NewAnnouncement,
-    params(PageQuery),
     responses((status = 201, body = AnnouncementView), (status = 422))
 )]
 pub(crate) async fn announce(

@@ -291,7 +291,7 @@ mod tests {
             let agents: Vec<_> = layout.slots.iter().flat_map(|s| &s.agents[0]).collect();
             assert!(!server_cpus.iter().any(|cpu| agents.contains(&cpu)));
             if cpus > 2 * slots {
-                let simulators = layout.simulators();
+                let simulators = layout.simulator_cpus();
                 assert!(!server_cpus.iter().any(|cpu| simulators.contains(cpu)));
             }
         }
@@ -301,7 +301,7 @@ mod tests {
     fn configured_agent_cpus_leave_the_rest_to_others() {
         let layout = |agents: &[usize], cpus, slots| {
             let layout = CpuLayout::with_agents_on(agents, &first_cpus(cpus), slots);
-            (layout.simulators(), layout.server)
+            (layout.simulator_cpus(), layout.server)
         };
         assert_eq!(layout(&[1], 2, 1), (vec![], vec![0]));
         assert_eq!(layout(&[3], 4, 1), (vec![2], vec![0, 1]));

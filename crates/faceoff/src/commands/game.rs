@@ -61,7 +61,7 @@ enum Action {
         #[arg(long)]
         both: bool,
     },
-    /// Print the end of your agent's log, with its faults
+    /// Print the beginning and the end of your agent's log, with its faults
     Log {
         /// The game's id
         game: GameId,
