@@ -68,11 +68,11 @@ pub const OBSERVATION_NOISE: Profile = AirHockeyProfile::ObservationNoise.name()
 pub const DISTURBANCE: Profile = AirHockeyProfile::Disturbance.name();
 /// The puck's pose freezes for some steps.
 pub const TRACKING_LOSS: Profile = AirHockeyProfile::TrackingLoss.name();
-/// Delays and table of the real laboratory.
+/// Delays, and tilt and friction of the table, as in a real laboratory; for rehearsals on a robot.
 pub const DELAY: Profile = AirHockeyProfile::Delay.name();
 /// Model mismatch, noise, disturbance and tracking loss together; for evaluations that count.
 pub const EVALUATION: Profile = AirHockeyProfile::Evaluation.name();
-/// The profiles of an ablation: no perturbation, each one of [`EVALUATION`] alone, and all of them.
+/// The profiles of an ablation: no perturbation, each one of [`EVALUATION`] alone, and all of them; not [`DELAY`].
 pub const ABLATION_PROFILES: [Profile; 6] = [
     IDEAL,
     MODEL_MISMATCH,
@@ -218,7 +218,7 @@ pub fn competition() -> Competition {
                 DELAY,
                 'L',
                 "delay",
-                "Delays and table of the real laboratory alone.",
+                "Delays, tilt and friction as in a real laboratory, alone.",
             ),
             profile(
                 EVALUATION,

@@ -239,7 +239,7 @@ pub struct Reason {
 #[derive(Debug, Clone, Default, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct NewAblation {
-    /// Episodes per task in each of the six perturbation profiles. Default: 100.
+    /// Episodes per task in each of the six profiles (`ideal`, four perturbations alone, all four). Default: 100.
     pub episodes_per_task: Option<u32>,
 }
 

@@ -28,7 +28,7 @@ use crate::{
         ARCHIVE_FILE, CALIBRATION_FILE, EPISODES_FILE, LOG_FILE, MANIFEST_FILE, RESULTS_FILE,
         STEPS_FILE, VIOLATIONS_FILE,
     },
-    table::HOST_TIME,
+    table::HOST_INTERFERENCE,
 };
 use arrow_array::RecordBatch;
 use faceoff_types::{Competition, EvaluationResult, MAX_EPISODES_PER_TASK, Task};
@@ -216,9 +216,10 @@ impl Dataset {
     /// [`DatasetError::Unreadable`] if `steps.parquet` is not a table of control steps.
     pub fn steps(&self) -> Result<StepTable, DatasetError> {
         let table = StepTable::open(self.table(STEPS_FILE)?, &self.competition)?;
-        if self.layout == Layout::Four && !table.has_host_time() {
+        // Layout 4 added the column of host interference: the time that other programs on the evaluator's machine took.
+        if self.layout == Layout::Four && !table.has_host_interference() {
             return Err(DatasetError::Unreadable(format!(
-                "{STEPS_FILE} has no column {HOST_TIME}"
+                "{STEPS_FILE} has no column {HOST_INTERFERENCE}"
             )));
         }
         Ok(table)

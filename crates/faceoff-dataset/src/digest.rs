@@ -66,11 +66,11 @@ impl StepDigests {
         self.times
             .update(&nanoseconds(timing.computation_time_s).to_le_bytes());
         self.times.update(&cpu_time_ns.to_le_bytes());
-        let host_time_ns = nanoseconds(timing.host_time_s);
-        if host_time_ns != 0 {
+        let host_interference_ns = nanoseconds(timing.host_time_s);
+        if host_interference_ns != 0 {
             // Computation times are not negative, so −2 cannot be mistaken for the next step's.
             self.times.update(&(-2_i64).to_le_bytes());
-            self.times.update(&host_time_ns.to_le_bytes());
+            self.times.update(&host_interference_ns.to_le_bytes());
         }
     }
 

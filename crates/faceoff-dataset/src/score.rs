@@ -3,7 +3,7 @@
 use crate::{
     dataset::{FileRange, Layout, StepTable},
     error::{DatasetError, RecordingError},
-    table::{HOST_TIME, constraint_columns},
+    table::{HOST_INTERFERENCE, constraint_columns},
     times::seconds,
 };
 use arrow_array::{
@@ -139,7 +139,7 @@ impl Tally {
             "episode",
             "step",
             "computation_time_ns",
-            HOST_TIME,
+            HOST_INTERFERENCE,
             "cpu_time_ns",
         ]
         .into_iter();
@@ -163,7 +163,7 @@ impl Tally {
     fn add_batch(&mut self, batch: &RecordBatch, constraints: &[String]) {
         let episodes = batch["episode"].as_primitive::<UInt32Type>();
         let steps = batch["step"].as_primitive::<UInt32Type>();
-        let [times, host_times, cpu_times] = ["computation_time_ns", HOST_TIME, "cpu_time_ns"]
+        let [times, host_interferences, cpu_times] = ["computation_time_ns", HOST_INTERFERENCE, "cpu_time_ns"]
             .map(|name| batch[name].as_primitive::<Int64Type>());
         let constraints: Vec<_> = constraints
             .iter()
@@ -173,7 +173,7 @@ impl Tally {
         for row in 0..batch.num_rows() {
             let timing = AnswerTiming {
                 computation_time_s: seconds(times.value(row)),
-                host_time_s: seconds(host_times.value(row)),
+                host_time_s: seconds(host_interferences.value(row)),
                 cpu_time_s: cpu_times
                     .is_valid(row)
                     .then(|| seconds(cpu_times.value(row))),

@@ -49,7 +49,7 @@ pub(super) fn describe_format(rules: &TournamentRules) -> String {
     };
     let minutes = format::one_decimal(f64::from(rules.steps) * CONTROL_STEP_S / 60.0);
     format!(
-        "{format}{mirrored}. A game lasts {minutes} min ({} control steps), perturbation profile {}.",
+        "{format}{mirrored}. A game lasts {minutes} min ({} control steps), with the perturbations of the profile “{}”.",
         group_digits(rules.steps),
         rules.profile
     )

@@ -196,15 +196,23 @@ def test_pickled_environment_continues_like_the_original(method: str) -> None:
 
 
 def test_pickled_state_is_restored_exactly() -> None:
+    """A pickle stores the episode's start and its actions, which are simulated again when it is loaded."""
     env = AirHockeyEnv("prepare")
     env.reset(seed=4)
     play(env, random_actions(env, 25))
-    state = env.save()
-    loaded = pickle.loads(pickle.dumps(state))
+    saved = env.save()
+    expected_state = env.state.array
+    expected_results = play(env, random_actions(env, 30, seed=1))
+    loaded = pickle.loads(pickle.dumps(saved))
     assert (loaded.seed, loaded.episode_number, loaded.steps) == (4, 0, 25)
     env.reset(seed=5)
+    assert not np.array_equal(env.state.array, expected_state)
     env.restore(loaded)
-    np.testing.assert_array_equal(env.save().__reduce__()[1][0], state.__reduce__()[1][0])
+    np.testing.assert_array_equal(env.state.array, expected_state)
+    repeated = play(env, random_actions(env, 30, seed=1))
+    for first, second in zip(expected_results, repeated, strict=True):
+        np.testing.assert_array_equal(first[0], second[0])
+        assert first[1:4] == second[1:4]
 
 
 def test_custom_reward_replaces_the_default() -> None:

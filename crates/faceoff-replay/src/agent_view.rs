@@ -16,7 +16,7 @@ const TIME_RESOLUTION_S: f64 = 1e-5;
 const OBSERVED_PUCK_COLUMN: usize = 0;
 const COMMAND_COLUMN: usize = 3;
 const COMPUTATION_TIME_COLUMN: usize = COMMAND_COLUMN + JOINTS;
-const HOST_TIME_COLUMN: usize = COMPUTATION_TIME_COLUMN + 1;
+const HOST_INTERFERENCE_COLUMN: usize = COMPUTATION_TIME_COLUMN + 1;
 
 /// The samples of one side; columns of observations start with sample 0 (before the first step), those of answers with sample 1.
 #[derive(Debug)]
@@ -89,7 +89,7 @@ impl AgentView {
             column.push(*value);
         }
         self.columns[COMPUTATION_TIME_COLUMN].push(timing.computation_time_s);
-        self.columns[HOST_TIME_COLUMN].push(timing.host_time_s);
+        self.columns[HOST_INTERFERENCE_COLUMN].push(timing.host_time_s);
         if timing.computation_time_s > CONTROL_STEP_S {
             self.late_samples.push(sample);
         }
@@ -107,12 +107,12 @@ impl AgentView {
     /// The columns, the late samples, and the tracking gaps. The column for host interference (time that other programs
     /// on the evaluator's machine took) is left out if it has only zeros.
     pub fn take(mut self) -> (Vec<Column>, Vec<u32>, Vec<TrackingGap>) {
-        if self.columns[HOST_TIME_COLUMN]
+        if self.columns[HOST_INTERFERENCE_COLUMN]
             .counts
             .iter()
             .all(|time| *time == 0)
         {
-            self.columns.truncate(HOST_TIME_COLUMN);
+            self.columns.truncate(HOST_INTERFERENCE_COLUMN);
         }
         (self.columns, self.late_samples, self.tracking_gaps)
     }

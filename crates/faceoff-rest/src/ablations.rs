@@ -126,7 +126,7 @@ async fn send_episode(
     send(&tag, conditions, headers, file.clip(key)).await
 }
 
-/// Starts an ablation: all tasks in all profiles, on episodes that no evaluation uses.
+/// Starts an ablation: all tasks in each of its profiles, on episodes that no evaluation uses.
 ///
 /// Its jobs run when no job that counts is pending.
 #[utoipa::path(

@@ -32,8 +32,8 @@ impl FromRequestParts<App> for EpisodePath {
     }
 }
 
-/// An episode of a submission's ablation, which runs the submission under each kind of perturbation alone: the parameters
-/// `{id}`, `{profile}`, `{task}` and `{episode}` of the path.
+/// An episode of a submission's ablation, which runs the submission without perturbations, with each kind alone, and with
+/// all: the parameters `{id}`, `{profile}`, `{task}` and `{episode}` of the path.
 #[derive(Debug, Clone, Copy)]
 pub struct AblationPath {
     pub submission: SubmissionId,

@@ -1,6 +1,7 @@
 //! Artifacts: the files of the season (bundles, recordings, datasets) in an object store. The database names each one by
 //! its key. Two kinds are for replays in the browser: *clips* are the recorded motions of a dataset's episodes. An *ablation*
-//! evaluates a submission under each perturbation alone; its *parts* are the clips of its single shards, until they are merged.
+//! evaluates a submission without perturbations, with each one alone, and with all; its *parts* are the clips of its single shards,
+//! until they are merged.
 //!
 //! A *folder* of artifacts is all that have a common key prefix, which ends before a slash.
 

@@ -262,7 +262,7 @@ pub enum Event {
     TeamReinstated {
         reason: String,
     },
-    /// An ablation of a submission was requested: its evaluation under each perturbation profile.
+    /// An ablation of a submission was requested: its evaluation without perturbations, with each one alone, and with all.
     #[serde(rename = "ablation_ordered")]
     AblationRequested {
         submission: SubmissionId,

@@ -75,7 +75,8 @@ id!(
     "evaluation"
 );
 id!(
-    /// An ablation: a submission evaluated in the ideal simulator and under each perturbation alone, to show what each of them costs.
+    /// An ablation: a submission evaluated in the ideal simulator, with each perturbation alone, and with all, to show what
+    /// each of them costs.
     AblationId,
     "ablation"
 );

@@ -57,8 +57,8 @@ impl Seed {
         self.derive("day", day.to_string().as_bytes())
     }
 
-    /// Season secret → the seed of all ablations, which evaluate a submission under each perturbation alone. It
-    /// differs from every day's seed, whose episodes may still count.
+    /// Season secret → the seed of all ablations, which evaluate a submission without perturbations, with each one
+    /// alone, and with all. It differs from every day's seed, whose episodes may still count.
     #[must_use]
     pub fn ablation(&self) -> Self {
         self.derive("ablation", &[])

@@ -3,7 +3,7 @@
 use faceoff_airhockey::AirHockey;
 use faceoff_api::requests::read_perturbations;
 use faceoff_episode::Simulator;
-use faceoff_sim::export::{Model, mjcf, urdf};
+use faceoff_sim::export::{ExportedModel, mjcf, urdf};
 use faceoff_types::{
     Competition, InvalidWeights, Magnitudes, Profile, Task, TaskWeights, UnknownProfile,
     UnknownTask,
@@ -28,12 +28,12 @@ pub fn description_files() -> [(&'static str, &'static str, String); 2] {
         (
             "robot.urdf",
             "The robot arm with its mallet, for simulators that read URDF",
-            urdf(Model::Plant),
+            urdf(ExportedModel::Plant),
         ),
         (
             "robot.mjcf.xml",
             "Robot arm, table and puck, for MuJoCo",
-            mjcf(Model::Plant),
+            mjcf(ExportedModel::Plant),
         ),
     ]
 }

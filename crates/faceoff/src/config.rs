@@ -136,7 +136,7 @@ pub struct EvaluationConfig {
     /// Allowed agent faults; with more, an evaluation ends without a score.
     pub max_faults: u32,
     /// Episodes per task and profile of the *ablation* that the schedule starts for each submission; 0: none. An ablation
-    /// evaluates the agent under each perturbation alone.
+    /// evaluates the agent on the same episodes without perturbations, with each one alone, and with all.
     pub ablation_episodes: u32,
     /// Weights of the tasks' success rates in the score.
     pub weights: TaskWeights,

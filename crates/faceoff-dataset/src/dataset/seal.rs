@@ -1,4 +1,5 @@
-//! The seal of an archive of layout 2: a BLAKE3 hash of all earlier bytes, at the end of the file in the zip comment.
+//! The seal of an archive of the old layout 2: a BLAKE3 hash of all earlier bytes, at the end of the file in the zip comment. Archives of
+//! later layouts have no seal.
 
 use super::layout::Layout;
 use std::{

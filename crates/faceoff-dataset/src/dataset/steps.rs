@@ -4,7 +4,7 @@ use super::{file_range::FileRange, footer::check_table};
 use crate::{
     error::DatasetError,
     files::STEPS_FILE,
-    table::{HOST_TIME, step_schema, with_zero_host_time},
+    table::{HOST_INTERFERENCE, step_schema, with_zero_host_interference},
 };
 use arrow_array::{RecordBatch, RecordBatchReader};
 use arrow_schema::{DataType, Schema};
@@ -50,8 +50,8 @@ pub(crate) fn check_columns(
 
 /// Is it a table of a layout before 4, without the column for host interference (the time that other programs on the
 /// evaluator's machine took)?
-fn lacks_host_time(found: &Schema) -> bool {
-    found.column_with_name(HOST_TIME).is_none()
+fn lacks_host_interference(found: &Schema) -> bool {
+    found.column_with_name(HOST_INTERFERENCE).is_none()
 }
 
 /// A reader of a table of control steps, with all columns or the named ones.
@@ -62,10 +62,10 @@ pub(super) fn reader<R: ChunkReader + 'static>(
     competition: &Competition,
 ) -> Result<ParquetRecordBatchReaderBuilder<R>, DatasetError> {
     let found = metadata.schema();
-    let lacks_host_time = lacks_host_time(found);
+    let lacks_host_interference = lacks_host_interference(found);
     let current_schema = step_schema(&competition.recording);
     let fields = current_schema.fields().iter();
-    let fields = fields.filter(|field| !lacks_host_time || field.name() != HOST_TIME);
+    let fields = fields.filter(|field| !lacks_host_interference || field.name() != HOST_INTERFERENCE);
     let expected = Schema::new(fields.cloned().collect::<Vec<_>>());
     check_columns(STEPS_FILE, found, &expected)?;
     if found.fields().len() != expected.fields().len() {
@@ -128,8 +128,8 @@ impl StepTable {
     }
 
     /// Does the table record host interference? Tables since layout 4 do.
-    pub(crate) fn has_host_time(&self) -> bool {
-        !lacks_host_time(self.metadata.schema())
+    pub(crate) fn has_host_interference(&self) -> bool {
+        !lacks_host_interference(self.metadata.schema())
     }
 
     /// All rows in order, in batches, with all columns or the named ones. In a table of an earlier layout host
@@ -139,11 +139,11 @@ impl StepTable {
     /// [`DatasetError::Absent`] if a column is unknown, [`DatasetError::Unreadable`] if the table is
     /// damaged.
     pub fn read(self, columns: Option<&[String]>) -> Result<StepBatches, DatasetError> {
-        let is_host_time = |name: &String| name == HOST_TIME;
-        let adds_host_time =
-            !self.has_host_time() && columns.is_none_or(|names| names.iter().any(is_host_time));
+        let is_host_interference = |name: &String| name == HOST_INTERFERENCE;
+        let adds_host_interference =
+            !self.has_host_interference() && columns.is_none_or(|names| names.iter().any(is_host_interference));
         let columns = columns.map(|names| -> Vec<String> {
-            let exists = |name: &&String| !(adds_host_time && is_host_time(name));
+            let exists = |name: &&String| !(adds_host_interference && is_host_interference(name));
             names.iter().filter(exists).cloned().collect()
         });
         let columns = columns.as_deref();
@@ -152,7 +152,7 @@ impl StepTable {
             .map_err(DatasetError::unreadable(STEPS_FILE))?;
         Ok(StepBatches {
             reader,
-            adds_zero_host_time: adds_host_time,
+            adds_zero_host_interference: adds_host_interference,
             unread: VecDeque::new(),
         })
     }
@@ -162,7 +162,7 @@ impl StepTable {
 pub struct StepBatches {
     reader: ParquetRecordBatchReader,
     /// Is the missing column for host interference added, with zeros?
-    adds_zero_host_time: bool,
+    adds_zero_host_interference: bool,
     /// Rows that [`StepBatches::take_rows`] has read but not returned.
     unread: VecDeque<RecordBatch>,
 }
@@ -186,7 +186,7 @@ impl StepBatches {
         }
         let next = self.reader.next().transpose();
         next.and_then(|batch| match batch {
-            Some(batch) if self.adds_zero_host_time => with_zero_host_time(&batch).map(Some),
+            Some(batch) if self.adds_zero_host_interference => with_zero_host_interference(&batch).map(Some),
             batch => Ok(batch),
         })
         .map_err(DatasetError::unreadable(STEPS_FILE))

@@ -2,7 +2,7 @@
 
 use super::{
     column_orders::TypeDefinedOrderWriter,
-    steps::{HOST_TIME, schema_with_host_time, with_zero_host_time},
+    steps::{HOST_INTERFERENCE, schema_with_host_interference, with_zero_host_interference},
     writer::{TableWriter, schema_metadata},
 };
 use crate::error::RecordingError;
@@ -148,10 +148,10 @@ fn rewrite(path: &Path, temporary_dir: &Path) -> Result<fs::File, RecordingError
     let file = tempfile::tempfile_in(temporary_dir)?;
     let copy = File::from_parts(file.try_clone()?, path);
     // Apart from this column, the layouts differ only in how the Parquet writer encodes them.
-    let lacks_host_time =
-        path.ends_with(STEPS_FILE) && builder.schema().column_with_name(HOST_TIME).is_none();
-    let schema = if lacks_host_time {
-        Arc::new(schema_with_host_time(builder.schema()))
+    let lacks_host_interference =
+        path.ends_with(STEPS_FILE) && builder.schema().column_with_name(HOST_INTERFERENCE).is_none();
+    let schema = if lacks_host_interference {
+        Arc::new(schema_with_host_interference(builder.schema()))
     } else {
         builder.schema().clone()
     };
@@ -161,8 +161,8 @@ fn rewrite(path: &Path, temporary_dir: &Path) -> Result<fs::File, RecordingError
         .map_err(RecordingError::unusable(&context))?
     {
         let mut batch = batch.map_err(RecordingError::unusable(&context))?;
-        if lacks_host_time {
-            batch = with_zero_host_time(&batch).map_err(RecordingError::unusable(&context))?;
+        if lacks_host_interference {
+            batch = with_zero_host_interference(&batch).map_err(RecordingError::unusable(&context))?;
         }
         writer.write(batch.columns().to_vec())?;
     }

@@ -38,7 +38,7 @@ pub(crate) fn step_schema(recording: &RecordingColumns) -> Schema {
     let action = DataType::List(Arc::new(action_item()));
     fields.push(Field::new("action", action, false));
     fields.push(Field::new(COMPUTATION_TIME, DataType::Int64, false));
-    fields.push(Field::new(HOST_TIME, DataType::Int64, false));
+    fields.push(Field::new(HOST_INTERFERENCE, DataType::Int64, false));
     fields.push(Field::new("cpu_time_ns", DataType::Int64, true));
     fields.extend_from_slice(state_and_constraints.fields());
     Schema::new(fields)
@@ -54,7 +54,7 @@ pub(crate) struct StepRows {
     observations: FloatColumns,
     actions: ListBuilder<Float64Builder>,
     computation_times: Int64Builder,
-    host_times: Int64Builder,
+    host_interferences: Int64Builder,
     cpu_times: Int64Builder,
     state_and_constraints: FloatColumns,
 }
@@ -71,7 +71,7 @@ impl StepRows {
             observations,
             actions: ListBuilder::new(Float64Builder::new()).with_field(action_item()),
             computation_times: Int64Builder::new(),
-            host_times: Int64Builder::new(),
+            host_interferences: Int64Builder::new(),
             cpu_times: Int64Builder::new(),
             state_and_constraints,
         }
@@ -91,7 +91,7 @@ impl StepRows {
             self.observations.take();
             self.actions.finish();
             self.computation_times.finish();
-            self.host_times.finish();
+            self.host_interferences.finish();
             self.cpu_times.finish();
             self.state_and_constraints.take();
         }
@@ -109,7 +109,7 @@ impl StepRows {
         self.actions.append(true);
         self.computation_times
             .append_value(nanoseconds(row.timing.computation_time_s));
-        self.host_times
+        self.host_interferences
             .append_value(nanoseconds(row.timing.host_time_s));
         self.cpu_times
             .append_option(row.timing.cpu_time_s.map(nanoseconds));
@@ -132,7 +132,7 @@ impl StepRows {
         columns.extend(self.observations.take());
         columns.push(Arc::new(self.actions.finish()));
         columns.push(Arc::new(self.computation_times.finish()));
-        columns.push(Arc::new(self.host_times.finish()));
+        columns.push(Arc::new(self.host_interferences.finish()));
         columns.push(Arc::new(self.cpu_times.finish()));
         columns.extend(self.state_and_constraints.take());
         columns
@@ -142,26 +142,26 @@ impl StepRows {
 /// Column of computation times, ns.
 const COMPUTATION_TIME: &str = "computation_time_ns";
 /// Column of host interference, ns: time that other programs on the evaluator's machine took. It exists since layout 4.
-pub(crate) const HOST_TIME: &str = "host_time_ns";
+pub(crate) const HOST_INTERFERENCE: &str = "host_time_ns";
 
 /// Adds the column for host interference to the schema of an earlier layout's table of control steps.
-pub(crate) fn schema_with_host_time(schema: &Schema) -> Schema {
+pub(crate) fn schema_with_host_interference(schema: &Schema) -> Schema {
     let mut fields = schema.fields().to_vec();
-    let field = Arc::new(Field::new(HOST_TIME, DataType::Int64, false));
-    fields.insert(host_time_index(schema), field);
+    let field = Arc::new(Field::new(HOST_INTERFERENCE, DataType::Int64, false));
+    fields.insert(host_interference_index(schema), field);
     Schema::new_with_metadata(fields, schema.metadata().clone())
 }
 
 /// Adds the column for host interference to rows of an earlier layout: 0, since it was not recorded.
-pub(crate) fn with_zero_host_time(batch: &RecordBatch) -> Result<RecordBatch, ArrowError> {
+pub(crate) fn with_zero_host_interference(batch: &RecordBatch) -> Result<RecordBatch, ArrowError> {
     let mut columns = batch.columns().to_vec();
     let zeros = Int64Array::from_value(0, batch.num_rows());
-    columns.insert(host_time_index(&batch.schema()), Arc::new(zeros));
-    RecordBatch::try_new(Arc::new(schema_with_host_time(&batch.schema())), columns)
+    columns.insert(host_interference_index(&batch.schema()), Arc::new(zeros));
+    RecordBatch::try_new(Arc::new(schema_with_host_interference(&batch.schema())), columns)
 }
 
 /// Index of the column for host interference: after the computation time.
-fn host_time_index(schema: &Schema) -> usize {
+fn host_interference_index(schema: &Schema) -> usize {
     let times = schema.column_with_name(COMPUTATION_TIME);
     times.map_or(schema.fields().len(), |(index, _)| index + 1)
 }

@@ -6,7 +6,7 @@ use crate::{
     dataset::Columns,
     files::{EPISODES_FILE, STEPS_FILE},
     score::Measurements,
-    table::{EpisodeRows, HOST_TIME, StepRows},
+    table::{EpisodeRows, HOST_INTERFERENCE, StepRows},
     times::seconds,
 };
 use arrow_array::{
@@ -255,7 +255,7 @@ impl EpisodeReplay<'_> {
         };
         Ok(AnswerTiming {
             computation_time_s: seconds(computation_time),
-            host_time_s: time(HOST_TIME)?.map(seconds).unwrap_or_default(),
+            host_time_s: time(HOST_INTERFERENCE)?.map(seconds).unwrap_or_default(),
             cpu_time_s: time("cpu_time_ns")?.map(seconds),
         })
     }

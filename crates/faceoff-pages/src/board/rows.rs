@@ -66,7 +66,7 @@ pub(super) struct Group<Row> {
 /// Conditions of an evaluation. Results under different conditions are not comparable.
 fn conditions(row: &BoardRow) -> String {
     format!(
-        "perturbation profile {}, {} episodes per task, rules {}",
+        "perturbations of the profile “{}”, {} episodes per task, rules {}",
         row.profile,
         episodes_per_day(row),
         row.ruleset

@@ -2,7 +2,7 @@
 
 use super::{
     numbers::{spaced, tidy},
-    parts::{Model, end_of_link, level_mallet_angles, quaternion, vector, visual_radius_m},
+    parts::{ExportedModel, end_of_link, level_mallet_angles, quaternion, vector, visual_radius_m},
 };
 use crate::{
     model::{GRAVITY_M_S2, INITIAL_Q, JOINTS, LINKS, SUBSTEP_S, TOOL},
@@ -19,13 +19,13 @@ use std::{f64::consts::FRAC_PI_2, fmt::Write as _};
 /// `universal_y` and `universal_x`, then `puck_x`, `puck_y`, `puck_yaw`; a motor (N m) for each joint of the
 /// arm; the key frame `start` has the arm in its start pose and the puck in the middle. SI units, radians.
 #[must_use]
-pub fn mjcf(model: Model) -> String {
+pub fn mjcf(model: ExportedModel) -> String {
     let mut out = String::new();
     write(model, &mut out).expect("writing to a string cannot fail");
     out
 }
 
-fn write(model: Model, out: &mut String) -> std::fmt::Result {
+fn write(model: ExportedModel, out: &mut String) -> std::fmt::Result {
     writeln!(
         out,
         "<!-- Written by `faceoff sim export`. SI units, radians. -->"
@@ -59,7 +59,7 @@ fn write(model: Model, out: &mut String) -> std::fmt::Result {
     pairs(model, &rims, out)?;
     motors(model, out)?;
     let mut pose = INITIAL_Q.to_vec();
-    if model == Model::Plant {
+    if model == ExportedModel::Plant {
         pose.extend(level_mallet_angles(&INITIAL_Q));
     }
     pose.extend([0.0; 3]);
@@ -156,7 +156,7 @@ fn middle_and_half(from: f64, to: f64) -> (f64, f64) {
 }
 
 /// Writes the arm and then the puck, so that the arm's joints come first.
-fn arm_and_puck(model: Model, out: &mut String) -> std::fmt::Result {
+fn arm_and_puck(model: ExportedModel, out: &mut String) -> std::fmt::Result {
     let base = table_from_robot(0, [0.0; 3]).map(tidy);
     writeln!(out, "    <body name=\"base\" pos=\"{}\">", spaced(&base))?;
     visual_capsule(out, vector(LINKS[0].offset), visual_radius_m(0))?;
@@ -201,7 +201,7 @@ fn arm_and_puck(model: Model, out: &mut String) -> std::fmt::Result {
         TOOL.end_effector_inertia_kg_m2,
     )?;
     writeln!(out, "      <site name=\"end_effector\" size=\"0.01\"/>")?;
-    if model == Model::Plant {
+    if model == ExportedModel::Plant {
         mallet(out)?;
     }
     writeln!(out, "    {}", "</body>".repeat(JOINTS + 2))?;
@@ -277,7 +277,7 @@ fn visual_capsule(out: &mut String, end: [f64; 3], radius: f64) -> std::fmt::Res
 }
 
 /// Writes the pairs of bodies that can be in contact with the puck.
-fn pairs(model: Model, rims: &[String], out: &mut String) -> std::fmt::Result {
+fn pairs(model: ExportedModel, rims: &[String], out: &mut String) -> std::fmt::Result {
     writeln!(out, "  <contact>")?;
     let mut pair = |other: &str, material: &Material| {
         let mu = material.friction;
@@ -292,14 +292,14 @@ fn pairs(model: Model, rims: &[String], out: &mut String) -> std::fmt::Result {
     for name in rims {
         pair(name, &RIM)?;
     }
-    if model == Model::Plant {
+    if model == ExportedModel::Plant {
         pair("mallet", &MALLET)?;
     }
     writeln!(out, "  </contact>")
 }
 
 /// Writes a motor for each joint of the arm.
-fn motors(model: Model, out: &mut String) -> std::fmt::Result {
+fn motors(model: ExportedModel, out: &mut String) -> std::fmt::Result {
     writeln!(out, "  <actuator>")?;
     let mut motor = |joint: &str, limit: f64| {
         writeln!(
@@ -311,7 +311,7 @@ fn motors(model: Model, out: &mut String) -> std::fmt::Result {
     for (i, link) in LINKS.iter().enumerate() {
         motor(&format!("joint_{}", i + 1), link.torque_limit_n_m)?;
     }
-    if model == Model::Plant {
+    if model == ExportedModel::Plant {
         motor("universal_y", TORQUE_LIMIT_N_M)?;
         motor("universal_x", TORQUE_LIMIT_N_M)?;
     }
@@ -353,7 +353,7 @@ mod tests {
 
     #[test]
     fn controller_model_has_no_mallet() {
-        let (plant, controller) = (mjcf(Model::Plant), mjcf(Model::Controller));
+        let (plant, controller) = (mjcf(ExportedModel::Plant), mjcf(ExportedModel::Controller));
         assert!(plant.contains("universal_x") && plant.contains("geom1=\"mallet\""));
         assert!(!controller.contains("universal") && !controller.contains("mallet"));
         for text in [plant, controller] {

@@ -10,7 +10,7 @@ use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI};
 
 /// Which model of the arm is exported.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Model {
+pub enum ExportedModel {
     /// The simulated arm: seven driven joints, the two of the universal joint, the mallet.
     #[default]
     Plant,

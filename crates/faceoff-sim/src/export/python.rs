@@ -60,7 +60,7 @@ pub fn python() -> String {
     out.line(
         "ACCELERATION_LIMIT_RAD_S2",
         tuple(&acceleration),
-        "±, as `hello` states it",
+        "±, as the protocol's message `hello` states it",
     );
     out.per_joint(
         "TORQUE_LIMIT_N_M",
@@ -93,7 +93,6 @@ pub fn python() -> String {
         "angles of the universal joint in that pose, mallet vertical",
     );
     out.section("The tool: on link 7 the end effector, on it by the universal joint the mallet.");
-    let z = "along the mallet's z";
     for (name, value, note) in [
         (
             "END_EFFECTOR_Z_M",
@@ -107,13 +106,21 @@ pub fn python() -> String {
             "about every axis",
         ),
         ("MALLET_MASS_KG", TOOL.mallet_mass_kg, ""),
-        ("MALLET_CENTRE_OF_MASS_Z_M", TOOL.mallet_centre_z_m, z),
+        (
+            "MALLET_CENTRE_OF_MASS_Z_M",
+            TOOL.mallet_centre_z_m,
+            "along the mallet's z",
+        ),
         (
             "MALLET_INERTIA_KG_M2",
             TOOL.mallet_inertia_kg_m2,
             "about every axis",
         ),
-        ("MALLET_CYLINDER_Z_M", TOOL.cylinder_centre_z_m, z),
+        (
+            "MALLET_CYLINDER_Z_M",
+            TOOL.cylinder_centre_z_m,
+            "centre of the cylinder that touches the puck, along the mallet's z",
+        ),
         ("MALLET_RADIUS_M", TOOL.cylinder_radius_m, ""),
         ("MALLET_HALF_HEIGHT_M", TOOL.cylinder_half_height_m, ""),
         (

@@ -2,7 +2,7 @@
 
 use super::{
     numbers::{spaced, tidy},
-    parts::{Model, end_of_link, roll_pitch_yaw, vector, visual_radius_m},
+    parts::{ExportedModel, end_of_link, roll_pitch_yaw, vector, visual_radius_m},
 };
 use crate::{
     model::{JOINTS, LINKS, TOOL},
@@ -20,13 +20,13 @@ const UNIVERSAL_INERTIA_KG_M2: f64 = 1e-14;
 ///
 /// URDF has no rotor inertia: a comment states [`crate::model::Link::armature_kg_m2`] of joint 7.
 #[must_use]
-pub fn urdf(model: Model) -> String {
+pub fn urdf(model: ExportedModel) -> String {
     let mut out = String::new();
     write(model, &mut out).expect("writing to a string cannot fail");
     out
 }
 
-fn write(model: Model, out: &mut String) -> std::fmt::Result {
+fn write(model: ExportedModel, out: &mut String) -> std::fmt::Result {
     writeln!(out, "<?xml version=\"1.0\"?>")?;
     writeln!(
         out,
@@ -63,7 +63,7 @@ fn write(model: Model, out: &mut String) -> std::fmt::Result {
         [ee, ee, ee, 0.0, 0.0, 0.0],
     )?;
     writeln!(out, "  </link>")?;
-    if model == Model::Plant {
+    if model == ExportedModel::Plant {
         universal_joint(out)?;
     }
     writeln!(out, "</robot>")

@@ -17,7 +17,7 @@ pub enum Factor {
     Disturbance,
     /// The puck's pose freezes for some steps.
     TrackingLoss,
-    /// Delays and table of the real laboratory. Not in [`Factor::EVALUATION`], since only the profile
+    /// Delays, and tilt and friction of the table, as in a real laboratory. Not in [`Factor::EVALUATION`], since only the profile
     /// `delay` uses it.
     Delay,
 }
@@ -80,7 +80,7 @@ impl Factors {
 
 /// A named set of perturbations.
 ///
-/// [`AirHockeyProfile::Delay`] is for a rehearsal: practice with the delays and the table of a real laboratory.
+/// [`AirHockeyProfile::Delay`] is for a rehearsal: practice with the delays, and a table with the tilt and friction, of a real laboratory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AirHockeyProfile {
@@ -94,7 +94,7 @@ pub enum AirHockeyProfile {
     Disturbance,
     /// Tracking loss alone.
     TrackingLoss,
-    /// Delays and table of the real laboratory alone.
+    /// Delays, and tilt and friction of the table, as in a real laboratory, alone.
     Delay,
     /// The four factors together; used for evaluations that count.
     Evaluation,

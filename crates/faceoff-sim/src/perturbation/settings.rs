@@ -17,7 +17,7 @@ pub struct PerturbationSettings {
     pub disturbance: DisturbanceSettings,
     /// Loss of the puck's tracking.
     pub tracking_loss: TrackingLossSettings,
-    /// Delays and table of the real laboratory.
+    /// Delays, and tilt and friction of the table, as in a real laboratory.
     pub delay: DelaySettings,
 }
 
@@ -116,7 +116,7 @@ impl Default for TrackingLossSettings {
     }
 }
 
-/// Delays and table of the real laboratory. Observations and actions are always one control step late.
+/// Delays, and tilt and friction of the table, as in a real laboratory. Observations and actions are always one control step late.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DelaySettings {

@@ -1,5 +1,5 @@
-//! Requests for ablations. An ablation runs a submission under each perturbation profile (none, each factor alone, all of
-//! them), to show which factor costs it points.
+//! Requests for ablations. An ablation runs a submission without perturbations, with each kind of perturbation alone, and
+//! with all, to show which kind costs it points. Each of these sets of perturbations is a *profile*.
 
 use crate::{
     boxed,

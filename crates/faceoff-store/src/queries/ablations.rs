@@ -1,4 +1,4 @@
-//! Queries of ablations: runs of a submission under each perturbation profile.
+//! Queries of ablations: runs of a submission without perturbations, with each one alone, and with all.
 
 use crate::{
     boxed,

@@ -1,5 +1,5 @@
-//! A team's submissions. A *submission* is an uploaded *bundle*, the files of an agent; an *ablation* evaluates it under each
-//! perturbation alone.
+//! A team's submissions. A *submission* is an uploaded *bundle*, the files of an agent; an *ablation* evaluates it without
+//! perturbations, with each one alone, and with all.
 
 use super::{
     ApiError, Client, RETRY_PAUSE, Unreachable, is_refused_with, is_temporary, read_json,

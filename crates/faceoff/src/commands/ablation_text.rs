@@ -1,4 +1,4 @@
-//! Text of an ablation: how much worse an agent does under each perturbation alone than under ideal conditions.
+//! Text of an ablation: how much worse an agent does with each perturbation alone, and with all, than under ideal conditions.
 
 use faceoff_api::views::ablation::{AblationStatus, AblationView};
 

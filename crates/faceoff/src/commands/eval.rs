@@ -45,8 +45,8 @@ pub struct EvalCommand {
     /// Perturbations: ideal, one factor's name, or evaluation [default: evaluation, or the stage's with --like-server]
     #[arg(long, value_parser = parse_profile)]
     profile: Option<Profile>,
-    /// Run the same episodes in every profile (ideal, each factor alone, all together) and compare
-    /// them; writes ablation.json and a folder for each profile
+    /// Run the same episodes in six profiles (ideal, each of the four factors of evaluation alone, and evaluation) and
+    /// compare them; writes ablation.json and a folder for each profile
     #[arg(long, conflicts_with = "profile")]
     ablation: bool,
     /// A number, or 64 hexadecimal digits; the same seed gives the same episodes everywhere. Several seeds, as in 1,2,3, are

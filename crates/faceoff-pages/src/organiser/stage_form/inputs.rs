@@ -204,8 +204,8 @@ mean_of_last:5: the mean of the last 5 days",
             Input {
                 name: "ablation_episodes",
                 label: "Ablation episodes",
-                hint: "per task and profile, of the ablation (a trial run under each perturbation alone) of each new submission at a \
-scheduled cutoff; 0: no ablations",
+                hint: "per task and profile, of the ablation of each new submission at a scheduled cutoff (the same episodes without \
+perturbations, with each one alone, and with all; counts for no board); 0: no ablations",
                 kind: InputKind::Number(0),
                 text: |stage| stage.settings.ablation_episodes.to_string(),
                 read: |form, patch| {

@@ -23,7 +23,8 @@ LAYOUTS = ("faceoff-dataset/4", "faceoff-dataset/3", "faceoff-dataset/2")
 
 Table = Literal["steps", "episodes"]
 
-HOST_TIME = "host_time_ns"
+# Host interference: the time that other programs on the evaluator's machine took while the agent computed.
+HOST_INTERFERENCE = "host_time_ns"
 COMPUTATION_TIME = "computation_time_ns"
 
 
@@ -218,16 +219,16 @@ class Dataset:
 
     def _read_steps(self, start: int, count: int, columns: Sequence[str] | None) -> pa.Table:
         rows = self._step_rows
-        if HOST_TIME in rows.columns or isinstance(columns, str):
+        if HOST_INTERFERENCE in rows.columns or isinstance(columns, str):
             return rows.read(start, count, columns)
         # Layouts before 4 do not record host interference; it counts as 0.
-        stored = None if columns is None else [name for name in columns if name != HOST_TIME]
+        stored = None if columns is None else [name for name in columns if name != HOST_INTERFERENCE]
         if columns is not None and len(stored or []) == len(columns):
             return rows.read(start, count, columns)
         table = rows.read(start, count, stored)
         names = table.column_names
-        position = names.index(COMPUTATION_TIME) + 1 if columns is None else list(columns).index(HOST_TIME)
-        return table.add_column(position, HOST_TIME, pa.array(np.zeros(count, dtype=np.int64)))
+        position = names.index(COMPUTATION_TIME) + 1 if columns is None else list(columns).index(HOST_INTERFERENCE)
+        return table.add_column(position, HOST_INTERFERENCE, pa.array(np.zeros(count, dtype=np.int64)))
 
     def _step_range(self, task: str | None) -> tuple[int, int]:
         if task is None:

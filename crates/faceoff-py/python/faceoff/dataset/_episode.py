@@ -80,7 +80,7 @@ class EpisodeArrays:
     computation_time_s: Floats
     """Time until the answer minus host interference, shape (N,)."""
     host_time_s: Floats
-    """Host interference during the answer, shape (N,)."""
+    """Host interference during the answer (time that other programs on the machine took), shape (N,)."""
     cpu_time_s: Floats
     """CPU time of the agent's processes, shape (N,); NaN where the host did not measure it."""
 

@@ -1,5 +1,5 @@
 //! `faceoff admin evaluation`, `submission`, `ablation`, `order-ablation` and `download-dataset`: results of any team.
-//! An *ablation* evaluates a submission under each perturbation alone, to show what each one costs it.
+//! An *ablation* evaluates a submission without perturbations, with each one alone, and with all, to show what each one costs it.
 
 use crate::{
     client::Client,
@@ -30,7 +30,8 @@ pub(super) enum ResultAction {
         /// The submission's id
         submission: SubmissionId,
     },
-    /// Request an ablation: the submission is evaluated under each perturbation alone, while no counting job is pending
+    /// Request an ablation: the submission is evaluated without perturbations, with each one alone, and with all, while no
+    /// counting job is pending
     OrderAblation {
         /// The submission's id
         submission: SubmissionId,

@@ -1,4 +1,5 @@
-//! `faceoff eval --ablation`: the same episodes under each perturbation alone. A *profile* is a set of perturbations.
+//! `faceoff eval --ablation`: the same episodes without perturbations, with each one alone, and with all. Each of these sets of
+//! perturbations is a *profile*.
 
 use super::{
     files::{ABLATION, write_json},
@@ -21,7 +22,7 @@ struct AblationFile {
     tasks: TaskMap<Vec<ProfileEffect>>,
 }
 
-/// Runs every profile into a folder of its name and compares them. Returns the number of agent faults.
+/// Runs each profile of the ablation into a folder of its name and compares them. Returns the number of agent faults.
 pub(super) fn run(setup: &EvalSetup, out: &Path, json: bool) -> anyhow::Result<usize> {
     let mut faults = 0;
     let mut runs = ProfileMap::new();

@@ -38,8 +38,8 @@ impl ExportArgs {
     /// Writes the model.
     pub fn run(&self) -> Result<()> {
         let model = match self.model {
-            Model::Plant => export::Model::Plant,
-            Model::Controller => export::Model::Controller,
+            Model::Plant => export::ExportedModel::Plant,
+            Model::Controller => export::ExportedModel::Controller,
         };
         ensure!(
             self.model == Model::Plant || matches!(self.format, Format::Urdf | Format::Mjcf),
