@@ -170,7 +170,7 @@ fn first_release_data_folder_is_upgraded_and_continued() {
         |answer| answer["state"] != "open",
     );
     assert_eq!(ablation["state"], "finished", "{ablation:#}");
-    // An ablation evaluates the submission under each perturbation of the simulator: six profiles.
+    // An ablation evaluates the submission without perturbations, with each of four alone, and with all: six profiles.
     assert_eq!(ablation["tasks"]["hit"].as_array().map(Vec::len), Some(6));
 
     // The last evaluation released the second day, and no evaluation was repeated.

@@ -118,8 +118,8 @@ pub fn competition() -> Competition {
         ],
         ends: [
             (EpisodeEnd::HORIZON, "time limit reached"),
-            (LEFT_TABLE, "puck left the table"),
-            (CROSSED_MIDDLE, "puck crossed the middle"),
+            (LEFT_TABLE, "puck left the table (goal or elsewhere)"),
+            (CROSSED_MIDDLE, "puck crossed the middle or came back"),
             (STOPPED, "puck stopped"),
             (REACHED_AXIS, "puck reached the long axis"),
             (EpisodeEnd::AGENT_FAULT, "agent fault"),
@@ -343,9 +343,11 @@ mod tests {
             limits: Default::default(),
             runtimes: None,
         };
-        assert_eq!(competition.check_rules(&mut rules), Ok(()));
+        assert_eq!(competition.check_and_normalise_rules(&mut rules), Ok(()));
         rules.profile = Profile::new("easy");
-        let refused = competition.check_rules(&mut rules).unwrap_err();
+        let refused = competition
+            .check_and_normalise_rules(&mut rules)
+            .unwrap_err();
         assert_eq!(refused.field(), "profile");
         let mut map = ProfileMap::from([(rules.profile, 0), (EVALUATION, 1), (IDEAL, 2)]);
         competition.sort_profiles(&mut map);

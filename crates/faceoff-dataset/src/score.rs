@@ -163,8 +163,9 @@ impl Tally {
     fn add_batch(&mut self, batch: &RecordBatch, constraints: &[String]) {
         let episodes = batch["episode"].as_primitive::<UInt32Type>();
         let steps = batch["step"].as_primitive::<UInt32Type>();
-        let [times, host_interferences, cpu_times] = ["computation_time_ns", HOST_INTERFERENCE, "cpu_time_ns"]
-            .map(|name| batch[name].as_primitive::<Int64Type>());
+        let [times, host_interferences, cpu_times] =
+            ["computation_time_ns", HOST_INTERFERENCE, "cpu_time_ns"]
+                .map(|name| batch[name].as_primitive::<Int64Type>());
         let constraints: Vec<_> = constraints
             .iter()
             .map(|name| batch[name.as_str()].as_primitive::<Float64Type>())

@@ -11,5 +11,7 @@ mod writer;
 pub(crate) use episodes::EpisodeRows;
 pub(crate) use game::{EntryRows, MotionRows, RallyRows, SIDE_TIMES, SideRows};
 pub(crate) use join::{ShardTable, join};
-pub(crate) use steps::{HOST_INTERFERENCE, StepRows, constraint_columns, step_schema, with_zero_host_interference};
+pub(crate) use steps::{
+    HOST_INTERFERENCE, StepRows, constraint_columns, step_schema, with_zero_host_interference,
+};
 pub(crate) use writer::TableWriter;

@@ -36,8 +36,8 @@ enum Offer {
     /// Membership of the named team.
     Member(String),
     Founder,
-    /// A new password for an existing user.
-    PasswordReset,
+    /// Access for an existing user again, with a new password.
+    RestoreAccess,
     /// The registration of the named team is waiting for approval.
     PendingRegistration(String),
     /// The registration of the named team was refused, with the reason.
@@ -131,7 +131,7 @@ async fn page_with(
                 Offer::Member(team.map(|name| name.to_string()).unwrap_or_default())
             }
             InvitationRole::Founder => Offer::Founder,
-            InvitationRole::PasswordReset(_) => Offer::PasswordReset,
+            InvitationRole::RestoreAccess(_) => Offer::RestoreAccess,
         },
         CodeStatus::PendingRegistration(registration) => {
             Offer::PendingRegistration(registration.team_name.to_string())

@@ -46,10 +46,10 @@ impl KeptField {
     }
 
     /// Was it a hidden field, whose value the user did not type? Hidden are ids, versions, and the role `return`, the invitation with
-    /// which a user sets a new password.
+    /// which a user gets access again.
     pub(super) fn is_hidden(&self) -> bool {
-        let is_password_reset = self.name == "role" && self.value == "return";
-        is_password_reset || self.name == "version" || self.value.parse::<Uuid>().is_ok()
+        let restores_access = self.name == "role" && self.value == "return";
+        restores_access || self.name == "version" || self.value.parse::<Uuid>().is_ok()
     }
 
     /// Is it a ticked checkbox?

@@ -45,6 +45,8 @@ def test_gymnasium_checker_passes(task: str, profile: str) -> None:
         check_env(env.unwrapped, skip_render_check=True)
 
 
+# Codes of the protocol: 1 to 5 are degrees of polynomials; -1 is a position and a velocity, each linear; None is a
+# trajectory, with 3 x 7 numbers for each of the 20 milliseconds of a control step.
 @pytest.mark.parametrize("interpolation", [1, 2, 3, 4, 5, -1, None])
 @pytest.mark.parametrize("action_mode", ["delta", "absolute", "raw"])
 def test_interpolations_and_action_modes_can_be_stepped(interpolation: Any, action_mode: str) -> None:

@@ -167,7 +167,7 @@ pub enum RallyEndKind {
     Foul,
     /// The puck lay out of reach.
     Stuck,
-    /// The puck left the table.
+    /// The puck left the table beside the goals.
     LeftTable,
     /// The commands of a side made the simulated world diverge.
     Diverged,

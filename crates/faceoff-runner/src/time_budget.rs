@@ -31,7 +31,8 @@ impl<'a> EpisodeBudget<'a> {
         self.used_s += answer_s;
         self.steps += 1;
         let simulated_s = f64::from(self.steps) * self.control_step_s;
-        let limit_s = self.time.episode_control_times * simulated_s + self.time.episode_extra_s;
+        let limit_s =
+            self.time.episode_control_time_factor * simulated_s + self.time.episode_extra_s;
         check_limit(Phase::Step, self.used_s, limit_s)
     }
 }
@@ -98,19 +99,20 @@ mod tests {
 
     #[test]
     fn reset_budget_grows_with_the_shard() {
-        let mut budget = ResetBudget::new(&TimeLimits::default(), 50);
-        for _ in 0..4 {
-            budget.spend(10.0);
+        // 30 s, and 0.2 s per episode.
+        for (episodes, limit_s) in [(50, 40.0), (100, 50.0)] {
+            let mut budget = ResetBudget::new(&TimeLimits::default(), episodes);
+            budget.spend(limit_s);
             assert_eq!(budget.check(), Ok(()));
+            budget.spend(0.5);
+            assert_eq!(
+                budget.check(),
+                Err(AgentFaultKind::TimeBudget {
+                    phase: Phase::Reset,
+                    used_s: limit_s + 0.5,
+                    limit_s
+                })
+            );
         }
-        budget.spend(0.5);
-        assert_eq!(
-            budget.check(),
-            Err(AgentFaultKind::TimeBudget {
-                phase: Phase::Reset,
-                used_s: 40.5,
-                limit_s: 40.0
-            })
-        );
     }
 }

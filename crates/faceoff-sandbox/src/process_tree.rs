@@ -36,9 +36,10 @@ pub(crate) struct ProcessTree {
     sandbox_init: Option<OwnedFd>,
     /// Pid of the sandbox's first process, as the host numbers it (inside it is 1).
     init_pid: Option<Pid>,
+    /// Reports of bubblewrap, the program that makes the sandbox; `None` for an agent without namespaces.
     pub(crate) status: Option<StatusPipe>,
     pub(crate) cgroup: Option<AgentCgroup>,
-    /// Answers some system calls of the tree.
+    /// Answers some system calls of the tree (seccomp user notification).
     pub(crate) call_handler_thread: Option<CallHandlerThread>,
     /// The scratch folder on the host, for agents without a mount namespace.
     scratch: Option<tempfile::TempDir>,

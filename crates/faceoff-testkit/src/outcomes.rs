@@ -6,7 +6,8 @@ use faceoff_types::{
     AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, EpisodeOutcome, Task, Violations,
 };
 
-/// The outcome of an episode that ended by an agent fault, or in success. Steps and times are arbitrary.
+/// The outcome of an episode that ended by an agent fault, or in success. Steps, times and the end of a success are
+/// arbitrary: no test depends on them.
 pub fn outcome(task: Task, episode: u32, has_fault: bool) -> EpisodeOutcome {
     let fault = has_fault.then(|| AgentFault {
         fault: AgentFaultKind::NonFinite,
@@ -21,6 +22,7 @@ pub fn outcome(task: Task, episode: u32, has_fault: bool) -> EpisodeOutcome {
         steps: 17,
         end: match has_fault {
             true => EpisodeEnd::AGENT_FAULT,
+            // The puck left the table, as it does in a goal; a success of some tasks cannot end so.
             false => LEFT_TABLE,
         },
         success: !has_fault,

@@ -367,7 +367,10 @@ impl Competition {
     ///
     /// # Errors
     /// The first invalid field.
-    pub fn check_rules(&self, rules: &mut StageRules) -> Result<(), InvalidStageRules> {
+    pub fn check_and_normalise_rules(
+        &self,
+        rules: &mut StageRules,
+    ) -> Result<(), InvalidStageRules> {
         rules.check()?;
         self.find_ruleset(rules.ruleset.as_str())?;
         for task in &rules.tasks {
@@ -550,7 +553,9 @@ mod tests {
             limits: Default::default(),
         };
         let competition = competition(tiers.map(parsed));
-        competition.check_rules(&mut rules).map(|()| rules)
+        competition
+            .check_and_normalise_rules(&mut rules)
+            .map(|()| rules)
     }
 
     #[test]

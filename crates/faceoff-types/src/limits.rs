@@ -96,7 +96,8 @@ pub struct TimeLimits {
     /// Largest mean answer time per task in a validation run, which checks an upload. A slower agent makes the submission invalid.
     pub mean_s: f64,
     /// Budget for the answers of an episode: this factor times the control time of its steps …
-    pub episode_control_times: f64,
+    #[serde(rename = "episode_control_times")]
+    pub episode_control_time_factor: f64,
     /// … plus this time.
     pub episode_extra_s: f64,
     /// Budget for the resets of a shard: this time per episode …
@@ -121,7 +122,7 @@ impl Default for TimeLimits {
             reset_s: 10.0,
             step_s: 1.0,
             mean_s: 0.02,
-            episode_control_times: 2.0,
+            episode_control_time_factor: 2.0,
             episode_extra_s: 2.0,
             reset_mean_s: 0.2,
             resets_extra_s: 30.0,
@@ -148,7 +149,7 @@ impl TimeLimits {
         max_faults: u32,
     ) -> f64 {
         let process_s = self.startup_s + self.bye_s;
-        let episode_s = longest_episode_s * self.episode_control_times
+        let episode_s = longest_episode_s * self.episode_control_time_factor
             + self.episode_extra_s
             + self.step_s
             + self.reset_mean_s;

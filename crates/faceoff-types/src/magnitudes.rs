@@ -113,7 +113,8 @@ fn known_text(known: &[String]) -> String {
 }
 
 impl Magnitudes {
-    /// Do all magnitudes have the competition's defaults? [`Competition::check_rules`](crate::Competition::check_rules) leaves none then.
+    /// Do all magnitudes have the competition's defaults?
+    /// [`Competition::check_and_normalise_rules`](crate::Competition::check_and_normalise_rules) leaves none then.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.0.0.is_empty()

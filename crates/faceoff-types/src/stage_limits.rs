@@ -33,8 +33,11 @@ pub struct StageLimits {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_s: Option<f64>,
     /// Budget for the answers of an episode: this factor times the control time of its steps …
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub episode_control_times: Option<f64>,
+    #[serde(
+        rename = "episode_control_times",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub episode_control_time_factor: Option<f64>,
     /// … plus this time, in seconds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub episode_extra_s: Option<f64>,
@@ -88,7 +91,7 @@ impl StageLimits {
             ("mean_s", self.mean_s, 0.001, 3600.0),
             (
                 "episode_control_times",
-                self.episode_control_times,
+                self.episode_control_time_factor,
                 0.001,
                 3600.0,
             ),
@@ -120,7 +123,10 @@ impl StageLimits {
         replace(&mut time.reset_s, self.reset_s);
         replace(&mut time.step_s, self.step_s);
         replace(&mut time.mean_s, self.mean_s);
-        replace(&mut time.episode_control_times, self.episode_control_times);
+        replace(
+            &mut time.episode_control_time_factor,
+            self.episode_control_time_factor,
+        );
         replace(&mut time.episode_extra_s, self.episode_extra_s);
         replace(&mut time.reset_mean_s, self.reset_mean_s);
         replace(&mut time.resets_extra_s, self.resets_extra_s);

@@ -72,9 +72,9 @@ async fn apply_retentions(store: &Store, now: Timestamp) {
     }
 }
 
-/// Removes the bundles of invalid submissions.
+/// Removes the bundles of invalid submissions, and all but a team's last logs of them.
 pub(crate) async fn remove_invalid_bundles(store: &Store, now: Timestamp) {
-    match store.remove_failed_bundles(now).await {
+    match store.clean_up_failed_submissions(now).await {
         Ok(0) => {}
         Ok(bundles) => tracing::info!(bundles, "invalid bundles were removed"),
         Err(error) => tracing::warn!(%error, "invalid bundles could not be removed"),

@@ -19,8 +19,9 @@ impl SlotCpus {
     }
 
     /// The CPUs of both sides of a game. The agent CPUs of a slot are halved, so three CPUs separate the simulator and
-    /// both sides. With only one agent CPU, the sides and the simulator share all CPUs of the slot; host interference
-    /// is measured as usual.
+    /// both sides. With only one agent CPU, the sides and the simulator share all CPUs of the slot. Then,
+    /// too, the time for which something other than the agent ran on its CPUs is measured for late answers: as *host
+    /// interference*, which is no part of the computation time.
     #[must_use]
     pub fn side_cpus(&self) -> [Vec<usize>; 2] {
         match &self.agents[..] {

@@ -22,8 +22,8 @@ pub fn simulator() -> Arc<dyn Simulator> {
     SIMULATOR.clone()
 }
 
-/// Files that describe the competition to other programs: file name, description, and content.
-pub fn description_files() -> [(&'static str, &'static str, String); 2] {
+/// Models of the robot for other programs: file name, description, and content.
+pub fn robot_model_files() -> [(&'static str, &'static str, String); 2] {
     [
         (
             "robot.urdf",

@@ -327,7 +327,7 @@ impl ConnectionsConfig {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SandboxConfig {
-    /// Layers (single protections) of the sandbox that are not used, for hosts that lack them.
+    /// Disabled layers (single protections) of the sandbox: they are not used, for hosts that lack them.
     pub given_up: Vec<Layer>,
     /// The runtimes' files are copied into memory if they are at most this large; 0: never.
     pub resident_bytes: u64,
@@ -398,7 +398,7 @@ impl Config {
             limits: Default::default(),
         };
         // Brings valid rules into the competition's order; `check` reports invalid ones.
-        competition().check_rules(&mut rules).ok();
+        competition().check_and_normalise_rules(&mut rules).ok();
         rules
     }
 

@@ -1,5 +1,9 @@
 //! Permissions of server and workers in the shipped configuration of NATS, the message broker between them. Messages have
 //! *subjects*, which the permissions name; *streams* store messages.
+//!
+//! Subjects of the worker `rack-1`: `faceoff.asks.rack-1` (its requests for jobs), `faceoff.outcomes.rack-1` (its results) and
+//! `faceoff.shows.rack-1` (frames of running games). `faceoff.orders` has the jobs of all workers; subjects that begin with `$JS.API`
+//! administer streams, and answers to requests go to `_INBOX`.
 
 use super::{server_config, worker_config};
 use crate::Team;

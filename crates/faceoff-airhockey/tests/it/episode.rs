@@ -216,6 +216,7 @@ fn divergence_is_an_agent_fault() {
         host_time_s: 0.0,
         cpu_time_s: None,
     };
+    // A simulation beyond its bounds counts as diverged; within these an agent reaches the bound of joint velocities soon.
     let narrow_bounds = Bounds {
         joint_rad_s: 50.0,
         ..Bounds::WIDE

@@ -54,9 +54,9 @@ pub enum InvitedRole {
     Member,
     /// The first member of a new team.
     Founder,
-    /// No new account: `person`, who has lost password and tokens, gets access again.
+    /// No new account: `person`, who has lost password and tokens, gets access again. Its name in JSON is `return`.
     #[serde(rename = "return")]
-    PasswordReset,
+    RestoreAccess,
 }
 
 /// An invitation to create.

@@ -65,7 +65,8 @@ pub(super) fn reader<R: ChunkReader + 'static>(
     let lacks_host_interference = lacks_host_interference(found);
     let current_schema = step_schema(&competition.recording);
     let fields = current_schema.fields().iter();
-    let fields = fields.filter(|field| !lacks_host_interference || field.name() != HOST_INTERFERENCE);
+    let fields =
+        fields.filter(|field| !lacks_host_interference || field.name() != HOST_INTERFERENCE);
     let expected = Schema::new(fields.cloned().collect::<Vec<_>>());
     check_columns(STEPS_FILE, found, &expected)?;
     if found.fields().len() != expected.fields().len() {
@@ -140,8 +141,8 @@ impl StepTable {
     /// damaged.
     pub fn read(self, columns: Option<&[String]>) -> Result<StepBatches, DatasetError> {
         let is_host_interference = |name: &String| name == HOST_INTERFERENCE;
-        let adds_host_interference =
-            !self.has_host_interference() && columns.is_none_or(|names| names.iter().any(is_host_interference));
+        let adds_host_interference = !self.has_host_interference()
+            && columns.is_none_or(|names| names.iter().any(is_host_interference));
         let columns = columns.map(|names| -> Vec<String> {
             let exists = |name: &&String| !(adds_host_interference && is_host_interference(name));
             names.iter().filter(exists).cloned().collect()
@@ -186,7 +187,9 @@ impl StepBatches {
         }
         let next = self.reader.next().transpose();
         next.and_then(|batch| match batch {
-            Some(batch) if self.adds_zero_host_interference => with_zero_host_interference(&batch).map(Some),
+            Some(batch) if self.adds_zero_host_interference => {
+                with_zero_host_interference(&batch).map(Some)
+            }
             batch => Ok(batch),
         })
         .map_err(DatasetError::unreadable(STEPS_FILE))

@@ -148,8 +148,11 @@ fn rewrite(path: &Path, temporary_dir: &Path) -> Result<fs::File, RecordingError
     let file = tempfile::tempfile_in(temporary_dir)?;
     let copy = File::from_parts(file.try_clone()?, path);
     // Apart from this column, the layouts differ only in how the Parquet writer encodes them.
-    let lacks_host_interference =
-        path.ends_with(STEPS_FILE) && builder.schema().column_with_name(HOST_INTERFERENCE).is_none();
+    let lacks_host_interference = path.ends_with(STEPS_FILE)
+        && builder
+            .schema()
+            .column_with_name(HOST_INTERFERENCE)
+            .is_none();
     let schema = if lacks_host_interference {
         Arc::new(schema_with_host_interference(builder.schema()))
     } else {
@@ -162,7 +165,8 @@ fn rewrite(path: &Path, temporary_dir: &Path) -> Result<fs::File, RecordingError
     {
         let mut batch = batch.map_err(RecordingError::unusable(&context))?;
         if lacks_host_interference {
-            batch = with_zero_host_interference(&batch).map_err(RecordingError::unusable(&context))?;
+            batch =
+                with_zero_host_interference(&batch).map_err(RecordingError::unusable(&context))?;
         }
         writer.write(batch.columns().to_vec())?;
     }

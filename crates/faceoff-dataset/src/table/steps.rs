@@ -157,7 +157,10 @@ pub(crate) fn with_zero_host_interference(batch: &RecordBatch) -> Result<RecordB
     let mut columns = batch.columns().to_vec();
     let zeros = Int64Array::from_value(0, batch.num_rows());
     columns.insert(host_interference_index(&batch.schema()), Arc::new(zeros));
-    RecordBatch::try_new(Arc::new(schema_with_host_interference(&batch.schema())), columns)
+    RecordBatch::try_new(
+        Arc::new(schema_with_host_interference(&batch.schema())),
+        columns,
+    )
 }
 
 /// Index of the column for host interference: after the computation time.

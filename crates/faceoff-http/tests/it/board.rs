@@ -73,7 +73,8 @@ async fn board_shows_tiers_rates_intervals_points_and_scores() {
         assert!(first.contains(part), "{part:?} is not in {first:?}");
     }
     let caption = &texts(&html, ".board caption")[0];
-    let setting = "perturbations of the profile “evaluation”, 1000 episodes per task, rules airhockey-2023.3";
+    let setting =
+        "perturbations of the profile “evaluation”, 1000 episodes per task, rules airhockey-2023.3";
     assert!(caption.contains(setting), "{caption}");
     let commitment = site.store.season().await.unwrap().commitment;
     let legend = texts(&html, ".legend, .board ~ .note").join(" ");

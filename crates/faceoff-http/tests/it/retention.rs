@@ -223,7 +223,10 @@ async fn unchecked_or_invalid_submission_cannot_be_deleted() {
     delete_it(&submission)
         .await
         .problem(409, "conflict", &["removes its bundle automatically"]);
-    site.store.remove_failed_bundles(site.now()).await.unwrap();
+    site.store
+        .clean_up_failed_submissions(site.now())
+        .await
+        .unwrap();
     delete_it(&submission)
         .await
         .problem(409, "conflict", &["nothing left to delete"]);

@@ -140,7 +140,10 @@ async fn invalid_submission_frees_its_storage_quota() {
     site.finish_validation(invalid_outcome("there is no agent.toml", ""))
         .await;
     let now = site.now();
-    assert_eq!(site.store.remove_failed_bundles(now).await.unwrap(), 1);
+    assert_eq!(
+        site.store.clean_up_failed_submissions(now).await.unwrap(),
+        1
+    );
     site.upload(&team.token, bundle(6000)).await.json(201);
     let path = format!("/api/v1/submissions/{}", string(&submission["id"]));
     let view = site.get(&path, Some(&team.token)).await.json(200);

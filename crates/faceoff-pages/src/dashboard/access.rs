@@ -165,10 +165,10 @@ fn invitation_row(view: InvitationView, names: &BTreeMap<String, String>) -> Inv
         (InvitedRole::Member, None, _) => "member".to_owned(),
         (InvitedRole::Organiser, ..) => "organiser".to_owned(),
         (InvitedRole::Founder, ..) => "first member of a new team".to_owned(),
-        (InvitedRole::PasswordReset, _, Some(person)) => {
+        (InvitedRole::RestoreAccess, _, Some(person)) => {
             format!("password reset of {}", name(format!("person:{person}")))
         }
-        (InvitedRole::PasswordReset, _, None) => "password reset".to_owned(),
+        (InvitedRole::RestoreAccess, _, None) => "password reset".to_owned(),
     };
     InvitationRow {
         id: view.id,
@@ -383,12 +383,12 @@ async fn revoke_token(
 #[derive(Deserialize)]
 struct InvitationForm {
     note: String,
-    /// Only in the form of organisers: `organiser`, `founder` (first member of a new team), `member`, `return` (password reset).
+    /// Only in the form of organisers: `organiser`, `founder` (first member of a new team), `member`, `return` (access again for a user).
     #[serde(default)]
     role: String,
     #[serde(default)]
     team: String,
-    /// The user whose password is reset.
+    /// The user who gets access again, with a new password.
     #[serde(default)]
     person: String,
 }
@@ -403,7 +403,7 @@ fn invitation_request(caller: &Caller, form: &InvitationForm) -> Result<NewInvit
     let role = match (caller.is_organiser(), form.role.as_str()) {
         (false, _) | (true, "member") => InvitedRole::Member,
         (true, "organiser") => InvitedRole::Organiser,
-        (true, "return") => InvitedRole::PasswordReset,
+        (true, "return") => InvitedRole::RestoreAccess,
         (true, "founder") => InvitedRole::Founder,
         (true, other) => {
             let detail = format!("expected member, founder, organiser or return, got {other:?}");
@@ -415,7 +415,7 @@ fn invitation_request(caller: &Caller, form: &InvitationForm) -> Result<NewInvit
         _ => None,
     };
     let person = match role {
-        InvitedRole::PasswordReset => Some(chosen("person", &form.person)?),
+        InvitedRole::RestoreAccess => Some(chosen("person", &form.person)?),
         _ => None,
     };
     Ok(NewInvitation {

@@ -1,4 +1,5 @@
-//! Games between real agents: the sides do not affect each other.
+//! Games between real agents: the sides do not affect each other. Penalty points of a side are counted in *windows*, stretches of 500
+//! control steps of the game, each of which counts like an episode.
 
 use crate::agents::{Agent, sandboxed_environment};
 use faceoff_airhockey::EVALUATION;
@@ -295,7 +296,7 @@ fn invalid_output_and_crashes_are_faults_of_their_side() {
         assert_eq!(faulty.faults.len(), 1, "{hooks}");
         let fault = faulty.faults[0].to_string();
         assert!(fault.contains(message), "{fault}");
-        assert_eq!(faulty.windows[0].faults, 1);
+        assert_eq!(faulty.windows[0].faults, 1, "{hooks}");
     }
 }
 

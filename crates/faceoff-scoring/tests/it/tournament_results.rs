@@ -56,6 +56,7 @@ fn forfeited_game_counts_10_to_0() {
     ]));
     let tournament = score_tournament(&played);
     let written = serde_json::to_value(&tournament.games[0]).unwrap();
+    // `winner_led`: was the winner ahead before the forfeit? A was not, with 1 : 7 goals.
     assert_eq!(
         written,
         json!({

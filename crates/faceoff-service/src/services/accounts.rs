@@ -13,15 +13,15 @@ use jiff::{SignedDuration, Timestamp};
 
 /// Default validity of an invitation.
 const DEFAULT_VALIDITY: SignedDuration = SignedDuration::from_hours(7 * 24);
-/// Validity of a password reset link, by default and at most.
-pub(crate) const PASSWORD_RESET_VALIDITY: SignedDuration = SignedDuration::from_hours(24);
+/// Validity of a link that gives a user access again, by default and at most.
+pub(crate) const RESTORE_ACCESS_VALIDITY: SignedDuration = SignedDuration::from_hours(24);
 /// Longest affiliation of a team.
 const MAX_AFFILIATION_CHARS: usize = 120;
 
 /// When an invitation that is created now expires by default.
 pub(crate) fn default_expiry(role: InvitedRole, now: Timestamp) -> Timestamp {
     let validity = match role {
-        InvitedRole::PasswordReset => PASSWORD_RESET_VALIDITY,
+        InvitedRole::RestoreAccess => RESTORE_ACCESS_VALIDITY,
         InvitedRole::Organiser | InvitedRole::Member | InvitedRole::Founder => DEFAULT_VALIDITY,
     };
     now.saturating_add(validity).unwrap_or(Timestamp::MAX)

@@ -1,7 +1,7 @@
 //! Invitations: creating, listing and revoking them. An *invitation* is a link with a secret code, by which a person gets an
 //! account as organiser, as member or founder of a team, or a new password.
 
-use super::accounts::{PASSWORD_RESET_VALIDITY, default_expiry, join_link};
+use super::accounts::{RESTORE_ACCESS_VALIDITY, default_expiry, join_link};
 use crate::{
     app::AppState,
     auth::Caller,
@@ -51,7 +51,7 @@ fn invitation_role(
     if new.role != InvitedRole::Member {
         check_absent("team", new.team.is_some())?;
     }
-    if new.role != InvitedRole::PasswordReset {
+    if new.role != InvitedRole::RestoreAccess {
         check_absent("person", new.person.is_some())?;
     }
     let forbidden = |detail: &str| Err(Problem::new(ProblemKind::Forbidden, detail));
@@ -69,13 +69,13 @@ fn invitation_role(
         (_, InvitedRole::Member) => new.team.map(InvitationRole::Member).ok_or_else(|| {
             Problem::invalid("team", "expected the id of the invited member's team")
         }),
-        (_, InvitedRole::PasswordReset) => new
+        (_, InvitedRole::RestoreAccess) => new
             .person
-            .map(InvitationRole::PasswordReset)
+            .map(InvitationRole::RestoreAccess)
             .ok_or_else(|| {
                 Problem::invalid(
                     "person",
-                    "expected the id of the user whose password is to be reset",
+                    "expected the id of the user who gets access again",
                 )
             }),
     }
@@ -112,7 +112,7 @@ pub async fn create_invitation(
         .expires_at
         .unwrap_or_else(|| default_expiry(new.role, now));
     let max_validity = match new.role {
-        InvitedRole::PasswordReset => PASSWORD_RESET_VALIDITY,
+        InvitedRole::RestoreAccess => RESTORE_ACCESS_VALIDITY,
         InvitedRole::Organiser | InvitedRole::Member | InvitedRole::Founder => MAX_VALIDITY,
     };
     if now.duration_until(expires_at) > max_validity {

@@ -88,7 +88,11 @@ pub async fn create_stage(app: &AppState, actor: Actor, new: NewStage) -> Result
             &mut settings,
             app.config.competition().ruleset(),
         )
-        .and_then(|()| app.config.competition().check_rules(&mut rules))
+        .and_then(|()| {
+            app.config
+                .competition()
+                .check_and_normalise_rules(&mut rules)
+        })
         .map_err(|error| invalid_rules(&error))?;
     let retention = checked_retention(patch.retention)?.unwrap_or_default();
     check_season_magnitudes(app, &rules.variation.perturbations).await?;
@@ -129,7 +133,11 @@ pub async fn change_stage(
             &mut settings,
             app.config.competition().ruleset(),
         )
-        .and_then(|()| app.config.competition().check_rules(&mut rules))
+        .and_then(|()| {
+            app.config
+                .competition()
+                .check_and_normalise_rules(&mut rules)
+        })
         .map_err(|error| invalid_rules(&error))?;
     let retention = checked_retention(change.retention)?;
     if rules.variation.perturbations != current_rules.variation.perturbations {

@@ -13,7 +13,7 @@ pub fn view(invitation: Invitation, now: Timestamp) -> InvitationView {
         InvitationRole::Organiser => (InvitedRole::Organiser, None, None),
         InvitationRole::Member(team) => (InvitedRole::Member, Some(team), None),
         InvitationRole::Founder => (InvitedRole::Founder, None, None),
-        InvitationRole::PasswordReset(person) => (InvitedRole::PasswordReset, None, Some(person)),
+        InvitationRole::RestoreAccess(person) => (InvitedRole::RestoreAccess, None, Some(person)),
     };
     let (state, accepted_by) = match invitation.state {
         InvitationState::Accepted { user, .. } => ("accepted", Some(user)),

@@ -2,9 +2,10 @@
 
 use faceoff_types::EpisodeEnd;
 
-/// The puck left the table, in a goal or elsewhere.
+/// The puck left the table, in a goal or elsewhere, or became too fast for the simulation.
 pub const LEFT_TABLE: EpisodeEnd = EpisodeEnd::new("left_table");
-/// `hit`, `defend`: the puck moved back across the middle line. `prepare`: it crossed the line.
+/// `hit`: the puck is in the opponent's half and moves back, without a goal. `defend`: the agent sent it back across the middle
+/// line. `prepare`: it crossed that line.
 pub const CROSSED_MIDDLE: EpisodeEnd = EpisodeEnd::new("crossed_middle");
 /// `defend`: the puck became slow enough.
 pub const STOPPED: EpisodeEnd = EpisodeEnd::new("stopped");

@@ -88,11 +88,10 @@ impl Store {
     }
 
     /// Deletes the bundles of submissions that did not pass their validation run: at once if they are invalid, and
-    /// [`PLATFORM_FAILED_BUNDLES_KEPT_FOR`] after a platform fault. The reason stays, and the log of a team's last [`INVALID_LOGS_KEPT`];
-    /// identical bundles share one.
-    /// Returns the number of bundles. An interrupted call is completed by the next one.
+    /// [`PLATFORM_FAILED_BUNDLES_KEPT_FOR`] after a platform fault. Of their logs a team's last [`INVALID_LOGS_KEPT`] stay, and
+    /// identical bundles share one; the reasons of all stay. Returns the number of bundles. An interrupted call is completed by the next one.
     #[boxed]
-    pub async fn remove_failed_bundles(&self, now: Timestamp) -> Result<usize> {
+    pub async fn clean_up_failed_submissions(&self, now: Timestamp) -> Result<usize> {
         let ended_until = earlier(now, PLATFORM_FAILED_BUNDLES_KEPT_FOR);
         let mut connection = self.database.read.acquire().await?;
         let failed = bundles::with_failed_validation(&mut connection, ended_until).await?;

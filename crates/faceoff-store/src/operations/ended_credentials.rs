@@ -165,7 +165,7 @@ pub(crate) async fn revoke_invitation(tx: &mut Tx, invitation: Invitation) -> Re
     invitations::set_revoked(tx, invitation.id, now).await?;
     let subject = match invitation.role {
         InvitationRole::Member(team) => Subject::Team(team),
-        InvitationRole::PasswordReset(user) => Subject::User(user),
+        InvitationRole::RestoreAccess(user) => Subject::User(user),
         InvitationRole::Organiser | InvitationRole::Founder => Subject::Season,
     };
     let event = Event::InvitationRevoked {

@@ -1,5 +1,6 @@
 //! Invitations: single-use links with which users join. Their creation, revocation and acceptance. A link contains a
-//! secret code; the code of a registration of a new team becomes an invitation once organisers have approved it.
+//! secret code; the code of a registration of a new team becomes an invitation once organisers have approved it. Links of the
+//! role [`RestoreAccess`](InvitationRole::RestoreAccess), stored as `return`, give an existing user access again.
 
 use crate::{
     boxed,
@@ -46,7 +47,7 @@ pub struct NewInvitation {
 pub struct JoinRequest {
     /// Hash of the code in the link.
     pub code_hash: [u8; 32],
-    /// Name of a new user; `None` for a returning one, who has a name.
+    /// Name of a new user; `None` for one who gets access again and has a name.
     pub name: Option<UserName>,
     /// Password hash as a PHC string, if the user wants a password.
     pub password_hash: Option<String>,
@@ -123,7 +124,8 @@ pub(super) async fn invite(tx: &mut Tx, new: NewInvitation) -> Result<Invitation
         InvitationRole::Organiser => ("organiser", Subject::Season),
         InvitationRole::Founder => ("founder", Subject::Season),
         InvitationRole::Member(team) => ("member", Subject::Team(team)),
-        InvitationRole::PasswordReset(user) => ("return", Subject::User(user)),
+        // The name in the log is that of the column and of the API.
+        InvitationRole::RestoreAccess(user) => ("return", Subject::User(user)),
     };
     let event = Event::Invited {
         invitation: invitation.id,
@@ -256,14 +258,14 @@ async fn join(tx: &mut Tx, mut request: JoinRequest) -> Result<JoinOutcome> {
             };
             add_user(tx, &mut request, team).await?
         }
-        InvitationRole::PasswordReset(user) => {
+        InvitationRole::RestoreAccess(user) => {
             // Before the user's own credentials are revoked, which may include this link.
             invitations::set_accepted(tx, invitation.id, user, now).await?;
             ended = restore_access(tx, user, &request).await?;
             user
         }
     };
-    if !matches!(invitation.role, InvitationRole::PasswordReset(_)) {
+    if !matches!(invitation.role, InvitationRole::RestoreAccess(_)) {
         invitations::set_accepted(tx, invitation.id, user, now).await?;
     }
     let token = NewToken {
@@ -345,7 +347,7 @@ impl Store {
                         ));
                     }
                 }
-                InvitationRole::PasswordReset(user) => {
+                InvitationRole::RestoreAccess(user) => {
                     let user = users::find(tx, user).await?;
                     if user.left_at.is_some() {
                         return StoreError::conflict(format!(
@@ -353,7 +355,7 @@ impl Store {
                             user.name
                         ));
                     }
-                    for earlier in invitations::open_resets_of(tx, user.id, now).await? {
+                    for earlier in invitations::open_access_links_of(tx, user.id, now).await? {
                         ended_credentials::revoke_invitation(tx, earlier).await?;
                     }
                 }

@@ -1,5 +1,9 @@
 //! Bundles (uploaded agents): quotas of the teams, and bundles that can be deleted. The data are columns of the table of
 //! submissions. *Evidence* are the bundles of a team that is disqualified, or that an organiser has retired: they are kept.
+//!
+//! Terms of the queries: the table `contestants` has the submission that plays each *run* (all episodes of an evaluation, or of one
+//! profile of an ablation). The view `counting_evaluations` has the evaluations that can count for boards. A row of `proposals` is a
+//! re-evaluation that an organiser requested: its evaluations count only if the organiser applies it.
 
 use crate::{
     column::Instant,
@@ -252,7 +256,7 @@ pub(crate) struct BundleUses {
     pub(crate) open: u32,
     /// Number of its evaluations on unreleased days.
     pub(crate) unreleased: u32,
-    /// Number of proposals with it that are neither applied nor dropped.
+    /// Number of undecided proposals (requested re-evaluations, neither applied nor dropped) in which it is evaluated.
     pub(crate) proposed: u32,
 }
 

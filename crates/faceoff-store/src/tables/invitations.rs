@@ -17,8 +17,9 @@ pub enum InvitationRole {
     Member(TeamId),
     /// The first member of a new team.
     Founder,
-    /// An existing user, who sets a new password or gets a new token; stored as `return`.
-    PasswordReset(UserId),
+    /// An existing user, who gets access again: with a new token or session, and a new password if they want one. Stored as
+    /// `return`.
+    RestoreAccess(UserId),
 }
 
 impl InvitationRole {
@@ -27,7 +28,7 @@ impl InvitationRole {
             Self::Organiser => ("organiser", None, None),
             Self::Member(team) => ("member", Some(team), None),
             Self::Founder => ("founder", None, None),
-            Self::PasswordReset(user) => ("return", None, Some(user)),
+            Self::RestoreAccess(user) => ("return", None, Some(user)),
         }
     }
 
@@ -36,7 +37,7 @@ impl InvitationRole {
             ("organiser", None, None) => Self::Organiser,
             ("founder", None, None) => Self::Founder,
             ("member", Some(team), None) => Self::Member(team),
-            ("return", None, Some(user)) => Self::PasswordReset(user),
+            ("return", None, Some(user)) => Self::RestoreAccess(user),
             _ => return Err(StoreError::Damaged(format!("invited as {role:?}"))),
         })
     }
@@ -219,7 +220,7 @@ pub(crate) async fn open_created_by(
 }
 
 /// The valid, unused links at `now` with which this user gets access again.
-pub(crate) async fn open_resets_of(
+pub(crate) async fn open_access_links_of(
     connection: &mut SqliteConnection,
     user: UserId,
     now: Timestamp,

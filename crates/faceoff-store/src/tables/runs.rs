@@ -35,7 +35,7 @@ pub(crate) enum RunState {
     Stopped,
 }
 
-/// Adds a queued run with its contestants, from side 0 on.
+/// Adds a queued run with its contestants (the submissions that play it), from side 0 on.
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,
     run: &Run,

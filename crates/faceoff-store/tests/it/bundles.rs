@@ -81,14 +81,14 @@ async fn invalid_bundle_is_deleted_but_reason_and_log_stay() {
     let valid = upload_stored(&f, &team, "valid", 100).await;
     f.validate().await;
     let invalid = upload_stored(&f, &team, "invalid", 1000).await;
-    assert_eq!(f.store.remove_failed_bundles(f.now).await.unwrap(), 0);
+    assert_eq!(f.store.clean_up_failed_submissions(f.now).await.unwrap(), 0);
     commit_invalid(&f).await;
     let waiting = upload_stored(&f, &team, "waiting", 10).await;
     let usage = f.store.upload_usage(team.id, f.now).await.unwrap();
     assert_eq!((usage.day_bytes, usage.stored_bytes), (1110, 1110));
 
-    assert_eq!(f.store.remove_failed_bundles(f.now).await.unwrap(), 1);
-    assert_eq!(f.store.remove_failed_bundles(f.now).await.unwrap(), 0);
+    assert_eq!(f.store.clean_up_failed_submissions(f.now).await.unwrap(), 1);
+    assert_eq!(f.store.clean_up_failed_submissions(f.now).await.unwrap(), 0);
     assert!(!is_kept(&f, &invalid).await);
     assert!(is_kept(&f, &valid).await && is_kept(&f, &waiting).await);
     let stored = f.store.submission(invalid.id).await.unwrap();
@@ -118,7 +118,7 @@ async fn identical_invalid_bundles_share_the_newest_log() {
         uploaded.push(upload_with_content(&f, team, name, 10, content).await.id);
         commit_invalid_with_log(&f, log).await;
     }
-    f.store.remove_failed_bundles(f.now).await.unwrap();
+    f.store.clean_up_failed_submissions(f.now).await.unwrap();
     let shared = "log of the second\n";
     for (id, expected) in
         uploaded
@@ -145,7 +145,8 @@ async fn logs_of_the_last_invalid_submissions_are_kept() {
         uploaded.push(upload_stored(&f, &alpha, &format!("bundle-{number}"), 10).await);
         commit_invalid(&f).await;
     }
-    f.store.remove_failed_bundles(f.now).await.unwrap();
+    f.store.clean_up_failed_submissions(f.now).await.unwrap();
+    // Of Alpha's logs the first two are older than the last INVALID_LOGS_KEPT.
     let has_log = async |id| f.store.submission_log(id).await.unwrap().unwrap() != "";
     assert!(!has_log(uploaded[0].id).await && !has_log(uploaded[1].id).await);
     for submission in &uploaded[2..] {
@@ -163,10 +164,13 @@ async fn bundle_after_platform_fault_is_kept_a_day_outside_quota() {
     fail_validation(&mut f).await;
     let usage = f.store.upload_usage(team.id, f.now).await.unwrap();
     assert_eq!((usage.day_bytes, usage.stored_bytes), (0, 1000));
-    assert_eq!(f.store.remove_failed_bundles(f.now).await.unwrap(), 0);
+    assert_eq!(f.store.clean_up_failed_submissions(f.now).await.unwrap(), 0);
     let removable_at = uploaded_at + PLATFORM_FAILED_BUNDLES_KEPT_FOR;
     assert_eq!(
-        f.store.remove_failed_bundles(removable_at).await.unwrap(),
+        f.store
+            .clean_up_failed_submissions(removable_at)
+            .await
+            .unwrap(),
         1
     );
     assert!(!is_kept(&f, &failed).await);
@@ -181,7 +185,7 @@ async fn shared_bundle_is_not_deleted() {
     f.validate().await;
     upload_stored(&f, &team, "shared", 100).await;
     commit_invalid(&f).await;
-    assert_eq!(f.store.remove_failed_bundles(f.now).await.unwrap(), 0);
+    assert_eq!(f.store.clean_up_failed_submissions(f.now).await.unwrap(), 0);
     assert!(is_kept(&f, &valid).await);
 }
 

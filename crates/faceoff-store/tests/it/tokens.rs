@@ -252,7 +252,7 @@ async fn migration_takes_missing_creators_from_the_event_log() {
     }
     let link = |code| NewInvitation {
         code_hash: [code; 32],
-        role: InvitationRole::PasswordReset(first),
+        role: InvitationRole::RestoreAccess(first),
         note: "a link".into(),
         requester: Requester::default(),
         expires_at: f.now + SignedDuration::from_hours(24 * 90),

@@ -39,7 +39,7 @@ async fn returning_user_keeps_identity_and_gets_new_tokens() {
     let f = TestStore::new().await;
     let alpha = f.create_team("Alpha").await;
     let ada = add_user(&f, 1, "Ada", InvitationRole::Member(alpha.id)).await;
-    invite(&f, 2, InvitationRole::PasswordReset(ada.id)).await;
+    invite(&f, 2, InvitationRole::RestoreAccess(ada.id)).await;
     let other_name = f.store.join(join_request([2; 32], "Eve"), f.now).await;
     assert_contains(&other_name.unwrap_err(), &["belongs to Ada"]);
     let request = JoinRequest {
@@ -140,7 +140,7 @@ async fn removed_user_loses_all_access() {
     assert!(matches!(unknown, Err(StoreError::NotFound("user"))));
     let invitation = NewInvitation {
         code_hash: [3; 32],
-        role: InvitationRole::PasswordReset(ada.id),
+        role: InvitationRole::RestoreAccess(ada.id),
         note: "Ada".into(),
         requester: Requester::default(),
         expires_at: f.now + SignedDuration::from_hours(1),
@@ -381,26 +381,30 @@ async fn sign_in_under_way_fails_after_a_new_password() {
     let alpha = f.create_team("Alpha").await;
     let ada = add_user(&f, 1, "Ada", InvitationRole::Member(alpha.id)).await;
     let token = crate::tokens::all_tokens(&f).await[0].id;
-    let set_password = async |password| {
+    let set_password_hash = async |password_hash| {
         f.store
-            .set_password(Actor::User(ada.id), ada.id, password, token, f.now)
+            .set_password(Actor::User(ada.id), ada.id, password_hash, token, f.now)
             .await
             .unwrap();
     };
-    set_password("old").await;
-    let sign_in = async |hash: u8, verified: &str| {
+    set_password_hash("old").await;
+    // `verified_hash`: the stored hash with which the typed password agreed, before another one was set.
+    let sign_in = async |token_hash: u8, verified_hash: &str| {
         let new = NewToken {
-            hash: [hash; 32],
+            hash: [token_hash; 32],
             kind: TokenKind::Session,
             owner: TokenOwner::User(ada.id),
             name: "browser".into(),
             requester: Requester::default(),
             expires_at: Some(f.now + SESSION_LIFETIME),
         };
-        f.store.sign_in(ada.id, verified, new, f.now).await.unwrap()
+        f.store
+            .sign_in(ada.id, verified_hash, new, f.now)
+            .await
+            .unwrap()
     };
     assert!(sign_in(30, "old").await);
-    set_password("new").await;
+    set_password_hash("new").await;
     assert!(!sign_in(31, "old").await);
     assert!(sign_in(32, "new").await);
     f.store

@@ -207,7 +207,11 @@ async fn submission_passes_from_upload_to_evaluation() {
     let storage = client.team_storage(team.team.id).await.unwrap();
     assert_eq!((storage.bundles, storage.bundle_bytes), (1, uploaded.bytes));
     let all = site.organiser.storage().await.unwrap();
-    assert_eq!(all[0].proposal_bytes, Some(0));
+    assert_eq!(
+        all[0].proposal_bytes,
+        Some(0),
+        "organisers see the size of the datasets of evaluations that do not count; there are none"
+    );
     let deletion = DeleteSubmission::default();
     let refusal = client.delete_submission(uploaded.id, &deletion).await;
     let refusal = refusal.unwrap_err().to_string();

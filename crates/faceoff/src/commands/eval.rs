@@ -167,7 +167,7 @@ impl EvalCommand {
         let envs = self.environments(&config, runtime)?;
         if let Some(server_stage) = &server_stage {
             server_stage.check_runtime(runtime, &envs[0])?;
-            for line in server_stage.report(runtime, &envs[0], &self.given_up(&config)) {
+            for line in server_stage.report(runtime, &envs[0], &self.disabled_layers(&config)) {
                 self.notes().print(format_args!("{line}"));
             }
             self.notes().print(format_args!(""));
@@ -250,7 +250,7 @@ impl EvalCommand {
     }
 
     /// Layers (protections) of the sandbox that are not used on this machine.
-    fn given_up(&self, config: &Config) -> Vec<String> {
+    fn disabled_layers(&self, config: &Config) -> Vec<String> {
         if self.no_sandbox {
             return vec!["the sandbox (--no-sandbox)".to_owned()];
         }

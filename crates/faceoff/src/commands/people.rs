@@ -50,7 +50,7 @@ fn invitation_line(invitation: &InvitationView) -> String {
         InvitedRole::Organiser => "organiser",
         InvitedRole::Member => "member",
         InvitedRole::Founder => "founder",
-        InvitedRole::PasswordReset => "return",
+        InvitedRole::RestoreAccess => "return",
     };
     format!(
         "{}  {role:<10} {:<10} for {}, until {}",

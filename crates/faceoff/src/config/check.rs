@@ -144,7 +144,7 @@ impl Config {
         if let Some(duplicate) = evaluation.tasks.iter().find(|task| !seen.insert(**task)) {
             bail!("evaluation.tasks: {duplicate} is listed twice");
         }
-        let checked = competition().check_rules(&mut rules);
+        let checked = competition().check_and_normalise_rules(&mut rules);
         let checked = checked.and_then(|()| settings.check());
         checked.map_err(|error| anyhow!("evaluation.{error}"))
     }
@@ -224,7 +224,7 @@ impl Config {
             ("time.mean_s", self.time.mean_s),
             (
                 "time.episode_control_times",
-                self.time.episode_control_times,
+                self.time.episode_control_time_factor,
             ),
             ("time.episode_extra_s", self.time.episode_extra_s),
             ("time.reset_mean_s", self.time.reset_mean_s),

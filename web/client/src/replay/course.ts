@@ -71,7 +71,7 @@ export function courseHas(shows: EventFilter): boolean {
   return !PART_ONLY_KINDS.some((kind) => shows({ kind }));
 }
 
-/** The score at a position. The sample of a rally's end still belongs to the rally. */
+/** The score at a position of the replay, in control steps. The sample of a rally's end still belongs to the rally. */
 export function courseScore(course: Course, position: number): readonly [number, number] {
   return course.ends.findLast((end) => end.sample < position)?.score ?? [0, 0];
 }

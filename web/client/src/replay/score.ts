@@ -1,4 +1,4 @@
-// The score of a game at any position.
+// The score of a game at any position of the replay: a time in control steps.
 
 import type { RallyEnd } from "../clip/motion";
 import { CHUNK_STEPS } from "./source";

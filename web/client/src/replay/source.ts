@@ -47,28 +47,29 @@ export class Source {
     return samples === null ? 1 : Math.max(Math.ceil((samples - 1) / CHUNK_STEPS), 1);
   }
 
-  indexOf(position: number): number {
+  /** Index of the part at a time of the replay, in control steps from sample 0; between steps it is a fraction. */
+  indexOf(stepPosition: number): number {
     if (this.addresses.samples === null) return 0;
-    return Math.min(Math.max(Math.floor(position / CHUNK_STEPS), 0), this.chunkCount - 1);
+    return Math.min(Math.max(Math.floor(stepPosition / CHUNK_STEPS), 0), this.chunkCount - 1);
   }
 
-  /** The position at which a part starts; null if there is no such part. */
+  /** The control step at which a part starts; null if there is no such part. */
   startOf(index: number): number | null {
     return index >= 0 && index < this.chunkCount ? index * CHUNK_STEPS : null;
   }
 
-  /** The part at a position if it is loaded. */
-  loadedPartAt(position: number): ReplayPart | null {
-    return this.parts.get(this.indexOf(position)) ?? null;
+  /** The part at a time of the replay, in control steps, if it is loaded. */
+  loadedPartAt(stepPosition: number): ReplayPart | null {
+    return this.parts.get(this.indexOf(stepPosition)) ?? null;
   }
 
-  async partAt(position: number): Promise<ReplayPart> {
-    return this.loadOnce(this.indexOf(position));
+  async partAt(stepPosition: number): Promise<ReplayPart> {
+    return this.loadOnce(this.indexOf(stepPosition));
   }
 
-  /** Starts to fetch the parts after this position, `count` of them. A failure is reported when the part is needed. */
-  prefetch(position: number, count: number): void {
-    const current = this.indexOf(position);
+  /** Starts to fetch the `count` parts after this time, in control steps. A failure is reported when the part is needed. */
+  prefetch(stepPosition: number, count: number): void {
+    const current = this.indexOf(stepPosition);
     for (let next = current + 1; next <= current + count && next < this.chunkCount; next++)
       this.loadOnce(next).catch(() => undefined);
   }

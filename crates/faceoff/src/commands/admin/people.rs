@@ -138,7 +138,7 @@ pub(super) async fn people(
         PeopleAction::InviteBack { person } => {
             let invitation = NewInvitation {
                 person: Some(find_user(client, &person).await?),
-                ..new_invitation(InvitedRole::PasswordReset, person)
+                ..new_invitation(InvitedRole::RestoreAccess, person)
             };
             invite(client, json, invitation).await
         }

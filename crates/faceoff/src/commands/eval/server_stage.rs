@@ -62,7 +62,7 @@ impl ServerStage {
         );
         let rules = &mut stage.rules.rules;
         competition()
-            .check_rules(rules)
+            .check_and_normalise_rules(rules)
             .map_err(|error| anyhow!("its stage “{}” has invalid rules: {error}", stage.name))?;
         let resources = server.stages.iter().find(|listed| listed.id == stage.id);
         let resources = resources.cloned().with_context(|| {
@@ -83,8 +83,8 @@ impl ServerStage {
         &self.stage
     }
 
-    /// Replaces the rules and limits of the configuration by the stage's. Runtimes and layers of the sandbox remain
-    /// those of this machine.
+    /// Replaces the rules and limits of the configuration by the stage's. The rules' *variation* has the stage's deviations from
+    /// the ruleset: weights, tier bounds, perturbations. Runtimes and layers of the sandbox remain those of this machine.
     pub fn apply(&self, config: &mut Config) {
         let limits = &self.resources.limits;
         config.bundle = limits.bundle;
@@ -120,12 +120,13 @@ impl ServerStage {
         Ok(())
     }
 
-    /// Stage, limits and differences of this machine, line by line.
+    /// Stage, limits and differences of this machine, line by line. `disabled_layers`: the layers (single protections) of the sandbox
+    /// that are not used on this machine.
     pub fn report(
         &self,
         runtime: &str,
         env: &AgentEnvironment,
-        given_up: &[String],
+        disabled_layers: &[String],
     ) -> Vec<String> {
         let rules = &self.stage.rules;
         let limits = &self.resources.limits;
@@ -167,10 +168,10 @@ impl ServerStage {
             &machine,
             &self.server.machine,
         ));
-        if !given_up.is_empty() {
+        if !disabled_layers.is_empty() {
             differences.push(format!(
                 "this machine does not use {}, so not all limits are enforced",
-                given_up.join(", ")
+                disabled_layers.join(", ")
             ));
         }
         if differences.is_empty() {

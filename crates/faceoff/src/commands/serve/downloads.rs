@@ -1,6 +1,7 @@
-//! The files of the page `/downloads`: this program, examples of agents, descriptions of the competition, and those of a folder.
+//! The files of the page `/downloads`: this program, examples of agents, models of the robot for other
+//! simulators, and the files of a folder.
 
-use crate::{commands::new::example_archives, competition::description_files};
+use crate::{commands::new::example_archives, competition::robot_model_files};
 use anyhow::{Context, ensure};
 use faceoff_http::{Download, DownloadContent, Downloads};
 use std::path::{Path, PathBuf};
@@ -26,7 +27,7 @@ pub(super) fn downloads(folder: Option<&Path>) -> anyhow::Result<Downloads> {
     for (name, about, archive) in example_archives()? {
         downloads.push(in_memory(name, about, archive));
     }
-    for (name, about, text) in description_files() {
+    for (name, about, text) in robot_model_files() {
         downloads.push(in_memory(name, about, text.into_bytes()));
     }
     if let Some(folder) = folder {

@@ -4,7 +4,8 @@ use anyhow::bail;
 use faceoff_sandbox::{Layer, LayerProbe, MemoryImage, Runtime};
 use std::collections::BTreeMap;
 
-/// Refuses a host that lacks a *layer* (one protection) of the sandbox which the configuration does not give up.
+/// Refuses a host that lacks a *layer* (one protection) of the sandbox which the configuration does not give up,
+/// that is, disable.
 pub fn check_sandbox(probes: &[LayerProbe], given_up: &[Layer]) -> anyhow::Result<()> {
     let mut missing = Vec::new();
     for probe in probes.iter().filter(|probe| !probe.available) {

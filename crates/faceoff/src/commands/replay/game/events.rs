@@ -111,6 +111,7 @@ fn rally_end(game: &RecordedGame, rally: &ListedRally, fouls: &mut [u32; 2]) -> 
         ("stuck", _) => {
             "the puck stopped in the middle, where no robot reaches it; no foul".to_owned()
         }
+        // In a game a goal is another end; in an episode `left_table` includes goals.
         ("left_table", _) => "the puck left the table beside the goals".to_owned(),
         ("diverged", _) => "the simulation diverged, see the fault".to_owned(),
         ("game_over", _) => format!("end of the game: {first} : {second}"),
