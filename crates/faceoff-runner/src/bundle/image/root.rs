@@ -309,8 +309,8 @@ impl<'a> Root<'a> {
         Ok(())
     }
 
-    /// Adds the parent folders, and removes the existing node at the location.
-    fn prepare_location(
+    /// Frees the location for another node: adds its parent folders, and removes the existing node.
+    fn free_location(
         &mut self,
         entry: &str,
         location: &Location,
@@ -346,7 +346,7 @@ impl<'a> Root<'a> {
         }
         let layer = self.layer;
         let is_written = matches!(kind, Kind::File);
-        let folder = self.prepare_location(entry, location)?;
+        let folder = self.free_location(entry, location)?;
         folder
             .children
             .insert(location.name.clone(), Node { layer, kind });
@@ -472,7 +472,7 @@ impl<'a> Root<'a> {
                 folder: Vec::new(),
                 name: name.to_owned(),
             };
-            self.prepare_location(name, &location)?;
+            self.free_location(name, &location)?;
             self.add_folders(&[name.to_owned()])?;
         }
         make_folders(&mut self.top_folder, &self.disk_path, self.budget)?;
@@ -497,7 +497,7 @@ impl EntrySink for Root<'_> {
             node.layer = layer;
             return Ok(());
         }
-        self.prepare_location(entry, &location)?;
+        self.free_location(entry, &location)?;
         self.add_folders(&path)
     }
 
