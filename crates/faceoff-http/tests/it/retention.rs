@@ -58,7 +58,7 @@ async fn retention_is_confirmed_applied_and_reported() {
         "retention is not a rule"
     );
     let dataset = format!("{}/dataset", evaluations[1]);
-    site.get(&dataset, Some(&team.token)).await;
+    assert_eq!(site.get(&dataset, Some(&team.token)).await.status, 200);
     let removed = site.store.apply_retentions(site.now()).await.unwrap();
     assert_eq!(removed.datasets, 1);
 

@@ -29,7 +29,7 @@ pub const FILES_KEPT_FOR: SignedDuration = RECORDINGS_KEPT_FOR;
 pub struct RemovalSummary {
     /// Number of datasets.
     pub datasets: u32,
-    /// Number of teams that these datasets belong to.
+    /// Number of teams that these datasets belong to. In the sum of several stages a team counts once for each.
     pub teams: u32,
     /// Number of bundles of submissions that are not used any more.
     pub bundles: u32,
