@@ -138,7 +138,7 @@ pub(crate) async fn retire_team(
 ) -> Result<Json<TeamView>, Problem> {
     let team = teams::find_editable(&app, &caller, id).await?;
     let effect = format!(
-        "{} can neither upload nor be evaluated from now on; evaluations whose cutoff has passed continue, and its results \
+        "the team {} can neither upload nor be evaluated from now on; evaluations whose cutoff has passed continue, and its results \
          stay",
         team.name
     );

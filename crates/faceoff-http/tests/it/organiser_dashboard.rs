@@ -316,7 +316,7 @@ async fn organiser_approves_changes_and_disqualifies_teams() {
     let (link, page) = open_decision(&mut grace, "/organiser/teams", "disqualify/").await;
     assert!(
         texts(&dashboard_page(&page, 200), "#effects")[0]
-            .starts_with("Alpha will disappear from all boards")
+            .starts_with("The team Alpha will disappear from all boards")
     );
     let fields = [("reason", "it read the seed"), ("confirm", "Alpha")];
     assert!(redirect_target(&grace.submit(&link, &fields).await).ends_with("done=disqualified"));

@@ -41,19 +41,22 @@ fn preview(state: &TournamentState, departure: &PlannedDeparture<'_>) -> Result<
     let Some(entrant) = entrants.find(|entrant| entrant.team == departure.team) else {
         return Err(Problem::new(
             ProblemKind::Conflict,
-            format!("{} is not in the tournament", state.name(departure.team)?),
+            format!(
+                "the team {} is not in the tournament",
+                state.name(departure.team)?
+            ),
         ));
     };
     let name = entrant.name.to_string();
     let reason = reason_sentence(departure.reason);
     let effect = if state.rounds.is_empty() {
         format!(
-            "{name} will leave the tournament, whose first round has not started. Its unfinished test and friendly games \
+            "the team {name} will leave the tournament, whose first round has not started. Its unfinished test and friendly games \
              will be cancelled. It may enter again"
         )
     } else if state.tournament.rules.finishes_round(departure.kind) {
         format!(
-            "{name} will be withdrawn for good. Its games of a running round will still be played and count, but it will not \
+            "the team {name} will be withdrawn for good. Its games of a running round will still be played and count, but it will not \
              play in later rounds. Its unfinished test and friendly games will be cancelled. {reason}"
         )
     } else {
@@ -73,7 +76,7 @@ fn preview(state: &TournamentState, departure: &PlannedDeparture<'_>) -> Result<
                 )
         });
         format!(
-            "{name} will be {outcome} for good{rank}. {} of its games, and its unfinished test and friendly games, will be \
+            "the team {name} will be {outcome} for good{rank}. {} of its games, and its unfinished test and friendly games, will be \
              cancelled. Its games of the running or next round{earlier_rounds} will not count. {reason}",
             open_games.count()
         )

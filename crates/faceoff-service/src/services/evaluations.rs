@@ -127,7 +127,7 @@ pub async fn preview_extra_evaluation(
     });
     Ok(replaced.map(|replaced| Preview {
         effect: format!(
-            "{} has an evaluation of {} that counts ({}). It will be voided at once, and the team's active submission will be \
+            "the team {} has an evaluation of {} that counts ({}). It will be voided at once, and the team's active submission will be \
              evaluated in its place. {}",
             team.name,
             stage_day.date,

@@ -137,7 +137,7 @@ pub async fn preview_disqualification(
         ),
     };
     let effect = format!(
-        "{} will disappear from all boards, and can neither upload nor be evaluated until you reinstate it. {open}. {}",
+        "the team {} will disappear from all boards, and can neither upload nor be evaluated until you reinstate it. {open}. {}",
         team.name,
         reason_sentence(reason)
     );
