@@ -189,7 +189,7 @@ def test_copy_with_a_robot_out_of_the_game_continues() -> None:
     np.testing.assert_array_equal(got[0]["robot_2"], expected[0]["robot_2"])
 
 
-def test_copies_before_a_reset_and_after_a_close_work() -> None:
+def test_copies_of_new_and_closed_games_are_new_and_closed() -> None:
     new = pickle.loads(pickle.dumps(AirHockeyGame()))
     assert new.reset(seed=1)[0]["robot_1"].shape == (23,)
     new.close()

@@ -47,12 +47,12 @@ class Policy:
 
     def __init__(self, act: Callable[[Any], Any], mallet_speed_m_s: float | None = None, frames: int = 1) -> None:
         self.act = act
-        self.count = frames
+        self.frame_count = frames
         self.mallet_speed_m_s = mallet_speed_m_s
         self.motion = None if mallet_speed_m_s is None else MalletMotion(1, mallet_speed_m_s, native.inverse)
 
     def reset(self, task: str, episode: int) -> None:
-        self.frames = np.zeros((self.count, 20), np.float32)
+        self.frames = np.zeros((self.frame_count, 20), np.float32)
         if self.motion is not None:
             self.motion.restart(np.ones(1, np.bool_))
 

@@ -48,15 +48,15 @@ def assert_same_score(folder: Path, policy: Policy, task: str, scratch: Path, **
     With the exported graph the score is the same. PyTorch rounds differently, which a bounce of the puck may amplify.
     """
     got = played(folder, task, 20, scratch)
-    graph = Policy(graph_of(folder), policy.mallet_speed_m_s, policy.count)
-    exact, own = (
+    graph = Policy(graph_of(folder), policy.mallet_speed_m_s, policy.frame_count)
+    of_graph, of_policy = (
         faceoff.evaluate(player, tasks=task, episodes=20, **arguments)["tasks"][task] for player in (graph, policy)
     )
-    for result in (got, exact):
+    for result in (got, of_graph):
         result["violations"].pop("computation_time", None)
     for name in ("successes", "steps", "violations"):
-        assert got[name] == exact[name], name
-    assert abs(got["successes"] - own["successes"]) <= 2
+        assert got[name] == of_graph[name], name
+    assert abs(got["successes"] - of_policy["successes"]) <= 2
 
 
 @pytest.mark.parametrize("algorithm", [PPO, A2C, SAC, TD3, DDPG])

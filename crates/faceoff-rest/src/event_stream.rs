@@ -44,7 +44,7 @@ pub(crate) async fn follow_events(
     headers: HeaderMap,
 ) -> Result<impl IntoResponse, Problem> {
     let filter = match &query.about {
-        Some(about) => about
+        Some(filters) => filters
             .parse()
             .map_err(|error| Problem::invalid("about", error))?,
         None => NoticeFilter::default(),
@@ -53,11 +53,13 @@ pub(crate) async fn follow_events(
         .get(LAST_EVENT_ID)
         .map(|value| parse_id(value.to_str().unwrap_or_default()))
         .transpose()?;
+    // A refusal advises to poll these.
+    let polled = "the resources";
     let permit = take_permit(
         &app.event_readers,
         caller.as_ref(),
         "the event stream",
-        "the resources",
+        polled,
     )?;
     let viewer = caller.as_ref().map_or(Viewer::Visitor, Viewer::new);
     let subscription = Subscription {

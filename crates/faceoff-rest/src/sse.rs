@@ -36,7 +36,8 @@ pub(super) async fn is_still_valid(
     }
 }
 
-/// Takes a permit for the reader of a stream. The message of a refusal says what can be polled instead.
+/// Takes a permit for the reader of a stream. The message of a refusal names the `stream` and what can be `polled`
+/// instead.
 pub(super) fn take_permit(
     readers: &PriorityPermits,
     caller: Option<&Caller>,

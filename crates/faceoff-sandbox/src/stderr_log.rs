@@ -16,7 +16,7 @@ use std::{
 };
 
 const CHUNK_BYTES: usize = 64 << 10;
-/// Minimum pause after a read. A flood, even one byte at a time, wakes the service at most a thousand times a
+/// Minimum pause after a read. A flood, even one byte at a time, wakes the evaluator at most a thousand times a
 /// second, and only the flooding agent blocks. The pipe's buffer bridges the pause.
 const PAUSE: Duration = Duration::from_millis(1);
 /// The pause is at least this multiple of the CPU time of the read. An agent that polls the other end through a

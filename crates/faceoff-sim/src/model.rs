@@ -220,6 +220,9 @@ pub const LINKS: [Link; JOINTS] = [
     },
 ];
 
+/// Range ± of each hinge of the universal joint, rad; its ends are the hinge's stops.
+pub const HINGE_RANGE_RAD: f64 = std::f64::consts::FRAC_PI_2;
+
 /// The tool on link 7: the end effector, the fixed end of the rod, and the mallet, which hangs on it by the universal joint. The
 /// mallet's z axis points from the universal joint to the mallet.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -31,7 +31,7 @@ pub struct Competition {
     pub has_games: bool,
     /// In the order of boards.
     pub tasks: Vec<TaskInfo>,
-    /// How episodes end, in the order of lists.
+    /// How episodes end, in the order in which pages list them.
     pub ends: Vec<EndInfo>,
     /// Kinds of violations of the agent's limits, in display order.
     pub violations: Vec<ViolationInfo>,
@@ -41,7 +41,7 @@ pub struct Competition {
     pub recording: RecordingColumns,
     /// The bounds of its tiers, unless a stage has others; `None`: a competition without tiers, whose boards rank by score alone.
     pub tiers: Option<TierBounds>,
-    /// Sets of perturbations, in the order of lists.
+    /// Sets of perturbations, in the order in which tables list them.
     pub profiles: Vec<ProfileInfo>,
     /// The profile of the simulator that teams have, with which ablations compare the others. It is one of `profiles`.
     pub ideal_profile: Profile,
@@ -313,12 +313,12 @@ impl Competition {
         found.ok_or_else(|| UnknownTask::new(name, self.task_names()))
     }
 
-    /// The profiles in the order of lists.
+    /// The profiles in the order in which tables list them.
     pub fn profile_names(&self) -> impl Iterator<Item = Profile> + Clone + '_ {
         self.profiles.iter().map(|info| info.profile)
     }
 
-    /// The profiles that an ablation plays, in the order of lists. The ideal one is always among them.
+    /// The profiles that an ablation plays, in the order in which tables list them. The ideal one is always among them.
     pub fn ablation_profiles(&self) -> impl Iterator<Item = Profile> + Clone + '_ {
         let is_played =
             |info: &&ProfileInfo| info.is_in_ablations || info.profile == self.ideal_profile;

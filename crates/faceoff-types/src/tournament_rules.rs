@@ -174,6 +174,7 @@ impl TournamentRules {
             max_faults: _,
         } = self.game_limits;
         for (field, got, most, expected) in [
+            // The name of `max_answer_s` in JSON.
             ("in_time_s", max_answer_s, 1.0, "above 0, at most 1"),
             ("total_s", total_s, 86_400.0, "above 0, at most 86400"),
             ("restart_s", restart_s, 600.0, "above 0, at most 600"),

@@ -95,7 +95,7 @@ async fn next_cutoff_follows_the_schedule() {
 }
 
 #[tokio::test]
-async fn day_without_submissions_can_still_be_started() {
+async fn refused_start_leaves_the_cutoff_available() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     site.post("/api/v1/days", Some(ADMIN), &json!({}))

@@ -79,7 +79,7 @@ async fn page_with(
 ) -> Result<Response, PageProblem> {
     let mut rows = Vec::new();
     for tournament in app.store.tournaments().await?.into_iter().rev() {
-        let state = tournament::listed_state(app, tournament.id).await?;
+        let state = tournament::state_for_list(app, tournament.id).await?;
         let summary = tournament::summary(&state);
         let progress = tournament::progress(&state);
         let teams = state.entrants.iter();

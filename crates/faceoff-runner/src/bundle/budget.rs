@@ -30,7 +30,7 @@ const MAX_LINK_BYTES: u64 = 128 << 20;
 /// ordinary paths use a tenth of it.
 const MAX_LOOKUP_BYTES: u64 = 256 << 20;
 /// A name counts as this many additional bytes, because a short name also costs time.
-const LOOKUP_BYTES_PER_NAME: u64 = 16;
+const EXTRA_BYTES_PER_NAME: u64 = 16;
 
 /// The clock is a parameter, so that tests can set the time.
 pub(super) type Clock<'a> = &'a dyn Fn() -> Instant;
@@ -229,7 +229,7 @@ impl<'a> Budget<'a> {
 
     /// Counts a lookup of a name, or of a path, in an image's root.
     pub(super) fn count_lookup(&self, bytes: usize) -> Result<(), BundleError> {
-        let lookup_bytes = self.lookup_bytes.get() + bytes as u64 + LOOKUP_BYTES_PER_NAME;
+        let lookup_bytes = self.lookup_bytes.get() + bytes as u64 + EXTRA_BYTES_PER_NAME;
         self.lookup_bytes.set(lookup_bytes);
         if lookup_bytes > MAX_LOOKUP_BYTES {
             return self
@@ -240,7 +240,7 @@ impl<'a> Budget<'a> {
 
     /// Counts a name that is compared while following a link, or the target of a link.
     pub(super) fn count_link_bytes(&self, bytes: usize) -> Result<(), BundleError> {
-        let link_bytes = self.link_bytes.get() + bytes as u64 + LOOKUP_BYTES_PER_NAME;
+        let link_bytes = self.link_bytes.get() + bytes as u64 + EXTRA_BYTES_PER_NAME;
         self.link_bytes.set(link_bytes);
         if link_bytes > MAX_LINK_BYTES {
             return self.refuse("the archive's links lead through too many others".to_owned());

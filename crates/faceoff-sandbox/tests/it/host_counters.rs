@@ -225,6 +225,7 @@ fn session_numbers_carry_no_message_to_a_later_agent() {
         let mut sending = sender.spawn();
         if bit {
             let started = (0..100).filter(|_| number(&mut sending).is_some()).count();
+            // The sandbox allows 8 at once and one more every 10 s, and refuses the others.
             assert!((8..100).contains(&started), "{started} sessions");
         }
         sending.finish(TIMEOUT).unwrap();

@@ -42,7 +42,8 @@ pub async fn register(
     })
 }
 
-/// Approves a registration and creates the team.
+/// Approves a registration and creates the team. `actor` is the cause of the change in the log; `requester` has user and token of the
+/// request, which are checked again when the change is committed.
 #[boxed]
 pub async fn approve_registration(
     app: &AppState,

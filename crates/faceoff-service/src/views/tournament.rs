@@ -23,14 +23,14 @@ use faceoff_types::{RoundNumber, StageName, TeamId, TeamName, TournamentId};
 pub async fn summaries(app: &AppState) -> Result<Vec<TournamentSummary>, Problem> {
     let mut summaries = Vec::new();
     for tournament in app.store.tournaments().await? {
-        summaries.push(summary(&listed_state(app, tournament.id).await?));
+        summaries.push(summary(&state_for_list(app, tournament.id).await?));
     }
     Ok(summaries)
 }
 
 /// The state of a tournament for lists: standings are built only once they decide the champion.
 #[boxed]
-pub async fn listed_state(app: &AppState, id: TournamentId) -> Result<TournamentState, Problem> {
+pub async fn state_for_list(app: &AppState, id: TournamentId) -> Result<TournamentState, Problem> {
     let state = TournamentState::without_standings(app, id).await?;
     match is_decided(&state) {
         true => state.with_standings(),

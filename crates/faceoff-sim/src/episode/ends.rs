@@ -12,7 +12,8 @@ pub const STOPPED: EpisodeEnd = EpisodeEnd::new("stopped");
 /// `prepare`: the puck reached the table's long axis.
 pub const REACHED_AXIS: EpisodeEnd = EpisodeEnd::new("reached_axis");
 
-/// All ends of air hockey's episodes, with the two that all competitions have, in the order of lists.
+/// All ends of air hockey's episodes, with the two that all competitions have, in the order in which pages list them. The position of an
+/// end is its code in Python (`ENDS`).
 pub const ALL: [EpisodeEnd; 6] = [
     EpisodeEnd::HORIZON,
     LEFT_TABLE,

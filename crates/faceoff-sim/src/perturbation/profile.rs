@@ -101,7 +101,7 @@ pub enum AirHockeyProfile {
 }
 
 impl AirHockeyProfile {
-    /// All profiles, in the order of lists.
+    /// All profiles, in the order in which tables list them.
     pub const ALL: [Self; 7] = [
         Self::Ideal,
         Self::ModelMismatch,

@@ -5,7 +5,7 @@ use super::{arm::Arm, arm_lanes::MotionLanes};
 use crate::{
     AirHockeyRuleset,
     dynamics::lanes::Lanes,
-    model::{DOFS, JOINTS, LINKS},
+    model::{DOFS, HINGE_RANGE_RAD, JOINTS, LINKS},
     table::puck::Puck,
 };
 use std::{f64::consts::FRAC_PI_2, fmt};
@@ -57,7 +57,7 @@ impl Bounds {
     /// The joint of an arm that is out of bounds or NaN.
     pub(super) fn joint_out_of_bounds(&self, arm: &Arm) -> Option<usize> {
         (0..DOFS).find(|&i| {
-            let range = LINKS.get(i).map_or(FRAC_PI_2, |link| link.range_rad);
+            let range = LINKS.get(i).map_or(HINGE_RANGE_RAD, |link| link.range_rad);
             let inside = arm.dq[i].abs() <= self.joint_rad_s
                 && arm.q[i].abs() - range <= self.beyond_stop_rad;
             !inside

@@ -1,4 +1,5 @@
 //! Dry friction and *stops* (the ends of the range) of the joints of one arm: soft constraints, as in MuJoCo, with one unknown torque each.
+//! The seven driven joints have friction and stops, the two hinges of the mallet's universal joint only stops.
 //!
 //! A constraint's torque (N m) is `stiffness · (target − acceleration)`, limited to its bounds: the *target* is the joint acceleration that
 //! the constraint wants (rad/s²), the *stiffness* its torque per difference from it (kg m²). Dry friction is bounded in both directions, a
@@ -7,11 +8,10 @@
 //! friction and stops; `friction.rs` handles the ordinary case, friction only, for several arms in SIMD lanes.
 
 use crate::{
-    model::{DOFS, JOINTS, LINKS},
+    model::{DOFS, HINGE_RANGE_RAD, JOINTS, LINKS},
     robot::plant::Plant,
     table::contact_law::{JOINT, Material},
 };
-use std::f64::consts::FRAC_PI_2;
 
 /// Largest number of iterations of the line search, and the relative change of the step length that ends it.
 const MAX_LINE_SEARCH_ITERATIONS: usize = 60;
@@ -85,7 +85,7 @@ impl JointConstraints {
             let range = if i < JOINTS {
                 LINKS[i].range_rad
             } else {
-                FRAC_PI_2
+                HINGE_RANGE_RAD
             };
             let depth = q[i].abs() - range;
             self.stops[i] = (depth > 0.0).then(|| {

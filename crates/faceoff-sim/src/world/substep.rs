@@ -21,14 +21,13 @@ use crate::{
         lanes::{Lanes, row, set_row},
         ldlt::Ldlt,
     },
-    model::{DOFS, JOINTS, LINKS, SUBSTEP_S},
+    model::{DOFS, HINGE_RANGE_RAD, JOINTS, LINKS, SUBSTEP_S},
     robot::{
         controller::{filter_velocity, torque},
         trajectory::Setpoint,
     },
     table::puck::Puck,
 };
-use std::f64::consts::FRAC_PI_2;
 
 /// One substep of all arms in the lanes, and of the pucks of their worlds.
 #[inline(always)]
@@ -163,7 +162,7 @@ fn solve_contacts_and_stops<T: Lanes, A>(
 #[inline(always)]
 fn is_beyond_stop<T: Lanes>(q: &[T; DOFS]) -> T::Mask {
     let is_joint_beyond = |i: usize| {
-        let range = LINKS.get(i).map_or(FRAC_PI_2, |link| link.range_rad);
+        let range = LINKS.get(i).map_or(HINGE_RANGE_RAD, |link| link.range_rad);
         T::splat(range).less_than(q[i].abs())
     };
     let mut beyond = is_joint_beyond(0);

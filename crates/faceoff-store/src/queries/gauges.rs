@@ -16,7 +16,7 @@ pub struct Gauges {
     pub out_of_space: u32,
     /// Has an organiser paused the queue?
     pub paused: bool,
-    /// Evaluations that have not ended.
+    /// Evaluations of days that have not ended.
     pub open_evaluations: u32,
 }
 

@@ -15,7 +15,7 @@ pub struct TeamStorage {
     /// Number of stored bundles; they count towards the quota.
     pub bundles: u32,
     pub bundle_bytes: u64,
-    /// Number of stored datasets of evaluations.
+    /// Number of stored datasets of evaluations of days, also of voided ones.
     pub datasets: u32,
     /// Total size of the measured datasets.
     pub dataset_bytes: u64,

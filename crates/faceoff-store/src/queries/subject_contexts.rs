@@ -34,7 +34,7 @@ pub enum SubjectContext {
         submission: SubmissionId,
         team: TeamId,
     },
-    /// An evaluation of a day, not one of a trial or a proposed re-evaluation.
+    /// An evaluation of a day, also a voided one; not one of a trial or a proposed re-evaluation.
     Evaluation {
         stage: StageId,
         day: Date,

@@ -39,6 +39,8 @@ impl Store {
     ) -> Result<WorkerResults> {
         let holder = worker.holder();
         let mut connection = self.database.read.acquire().await?;
+        // A prefix is tested by two comparisons: from `remote/` to `remote0`, since the character 0 follows /. The first pair makes
+        // the partial index of jobs that remote workers have done usable; the second one selects this worker's slots.
         let evaluations = sqlx::query_scalar!(
             r#"SELECT e.id AS "id!"
                FROM jobs j JOIN shards s ON s.job_id = j.id JOIN counting_evaluations e ON e.run_id = s.run_id

@@ -2,8 +2,9 @@
 //! submissions. *Evidence* are the bundles of a team that is disqualified, or that an organiser has retired: they are kept.
 //!
 //! Terms of the queries: the table `contestants` has the submission that plays each *run* (all episodes of an evaluation, or of one
-//! profile of an ablation). The view `counting_evaluations` has the evaluations that can count for boards. A row of `proposals` is a
-//! re-evaluation that an organiser requested: its evaluations count only if the organiser applies it.
+//! profile of an ablation). The view `counting_evaluations` has the evaluations of days, also voided ones, which do not count. A row
+//! of `proposals` is a trial or a re-evaluation that an organiser requested. The evaluations of a re-evaluation count only if the
+//! organiser applies it, those of a trial never.
 
 use crate::{
     column::Instant,
@@ -254,9 +255,9 @@ pub(crate) struct BundleUses {
     pub(crate) is_active: bool,
     /// Number of its open evaluations and ablations.
     pub(crate) open: u32,
-    /// Number of its evaluations on unreleased days.
+    /// Number of its evaluations on unreleased days, also failed and voided ones.
     pub(crate) unreleased: u32,
-    /// Number of undecided proposals (requested re-evaluations, neither applied nor dropped) in which it is evaluated.
+    /// Number of undecided proposals (trials and requested re-evaluations, neither applied nor dropped) in which it is evaluated.
     pub(crate) proposed: u32,
 }
 

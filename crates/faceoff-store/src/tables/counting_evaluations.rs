@@ -1,6 +1,6 @@
 //! The view `counting_evaluations`: the evaluations of days, without those of proposals (trials and proposed re-evaluations). In
-//! spite of its name it also has evaluations that do not count: open, failed and voided ones. This module reads the part of
-//! their state that organisers' decisions depend on, and stores these decisions.
+//! spite of its name it also has evaluations that do not count: open and voided ones, and those that failed for another reason than
+//! agent faults. This module reads the part of their state that organisers' decisions depend on, and stores these decisions.
 
 use crate::{column::Instant, error::Result, tables::decision_records::DecisionRecord};
 use faceoff_types::{EvaluationId, StageDay, TeamId};

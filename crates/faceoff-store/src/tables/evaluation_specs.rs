@@ -23,7 +23,7 @@ pub(crate) struct EvaluationSpec {
     pub(crate) rerun_of: Option<EvaluationId>,
 }
 
-/// The evaluation with this id.
+/// The evaluation of a day with this id, also a voided one.
 pub(crate) async fn find(
     connection: &mut SqliteConnection,
     id: EvaluationId,

@@ -1,6 +1,6 @@
 //! The table of evaluations: their state from the queue to the result. It holds those of days, which count, and those of
 //! proposals (trials and proposed re-evaluations), which do not. The view `counting_evaluations` has the former only, also if
-//! they are open or voided.
+//! they are open, failed or voided.
 
 use crate::{
     column::{Instant, Json},
@@ -275,7 +275,7 @@ impl EvaluationRow {
         })
     }
 
-    /// For a row of `counting_evaluations`.
+    /// For a row of `counting_evaluations`: an evaluation of a day, also a voided one.
     pub(crate) fn into_evaluation(mut self, progress: RunProgress) -> Result<Evaluation> {
         let plan = self.take_plan();
         let state = self.take_state(progress, plan.episodes_total())?;
@@ -339,7 +339,7 @@ pub(crate) async fn find(
         .ok_or(StoreError::NotFound("evaluation"))
 }
 
-/// A team's evaluations, the newest first.
+/// A team's evaluations on all days, also voided ones, the newest first.
 pub(crate) async fn of_team(
     connection: &mut SqliteConnection,
     team: TeamId,
@@ -407,7 +407,7 @@ pub(crate) async fn on_date_after(
     .await?)
 }
 
-/// The evaluations of a stage on one day, in the order in which they were queued.
+/// The evaluations of a stage on one day, also voided ones, in the order in which they were queued.
 pub(crate) async fn of_day(
     connection: &mut SqliteConnection,
     stage_day: StageDay,
@@ -541,7 +541,7 @@ pub(crate) async fn count_open_proposed(
     .await?)
 }
 
-/// Number of open evaluations that count, of one day or of all days.
+/// Number of open evaluations of one day or of all days, without those of proposals.
 pub(crate) async fn count_open(
     connection: &mut SqliteConnection,
     stage_day: Option<StageDay>,

@@ -1,5 +1,6 @@
 //! Recent durations of jobs: their slot time, for which a slot of a worker was occupied (the column `charged_ms`). Of the
-//! evaluations only those that count on the boards are read (`counting_evaluations`), no trials and no proposed re-evaluations.
+//! evaluations those of days are read (`counting_evaluations`), also if they were voided later; no trials and no proposed
+//! re-evaluations.
 
 use crate::{column::Instant, error::Result};
 use faceoff_types::{EvaluationId, RunId, StageDay, TeamId};

@@ -1,5 +1,8 @@
 //! The table of retentions, which say how long a stage's large files (datasets and bundles) are kept, and queries for their
 //! removal.
+//!
+//! The view `counting_evaluations` has the evaluations of days, also open, failed and voided ones, but not those of proposals
+//! (trials, and re-evaluations that were not applied).
 
 use crate::{
     column::{Instant, Json},
@@ -93,7 +96,7 @@ impl ScoredEvaluation {
     }
 }
 
-/// The finished evaluations of a stage, grouped by team, the newest day first.
+/// The finished evaluations of a stage, also voided ones, grouped by team, the newest day first.
 pub(crate) async fn scored_evaluations(
     connection: &mut SqliteConnection,
     stage: StageId,
@@ -126,7 +129,7 @@ pub(crate) async fn scored_evaluations(
         .collect())
 }
 
-/// Number of proposals of a stage that are neither applied nor dropped.
+/// Number of a stage's proposals (trials and proposed re-evaluations) that are neither applied nor dropped.
 pub(crate) async fn count_proposals(
     connection: &mut SqliteConnection,
     stage: StageId,
@@ -147,6 +150,8 @@ pub(crate) async fn idle_bundles(
     stage: StageId,
     removable: &[EvaluationId],
 ) -> Result<Vec<(SubmissionId, u64)>> {
+    // `counting_evaluations` has voided evaluations, too: until their datasets are removed, the bundle is kept. Those of
+    // proposals have a condition of their own.
     let rows = sqlx::query!(
         "SELECT s.id, s.bundle_bytes AS bytes
          FROM submissions s JOIN teams t ON t.id = s.team_id
@@ -196,8 +201,8 @@ pub(crate) async fn set_dataset_removed(
     Ok(())
 }
 
-/// Datasets that were marked as removed until `removed_until` and whose files still exist, with their keys. Evidence is left
-/// out.
+/// Datasets that were marked as removed until `removed_until` and whose files still exist, with their keys: of evaluations
+/// of days, also voided ones. Evidence is left out.
 pub(crate) async fn deletable_datasets(
     connection: &mut SqliteConnection,
     removed_until: Timestamp,

@@ -735,7 +735,7 @@ async fn team_retired_by_organiser_cannot_delete_files() {
 }
 
 #[tokio::test]
-async fn storage_is_reported_without_reading_files() {
+async fn storage_sums_stored_sizes_and_hides_unreleased_days() {
     let mut f = TestStore::new().await;
     let alpha = stored_submission_of(&f, "Alpha").await;
     let beta = stored_submission_of(&f, "Beta").await;

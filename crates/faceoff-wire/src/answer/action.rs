@@ -1,4 +1,6 @@
-//! Reads the `action` of an `act` line: nested arrays of numbers, whose shape depends on the agent's layout.
+//! Reads the `action` of an `act` line: nested arrays of numbers, whose shape depends on the action layout (for air hockey, the
+//! interpolation) of the agent's `ready`. The texts of errors contain markers ([`error_markers`]), by which
+//! [`diagnosis`](super::diagnosis) finds the kind of an error, since serde errors carry only text.
 
 use super::error_markers;
 use faceoff_types::ACTION_LIMIT;

@@ -80,6 +80,7 @@ mod tests {
                 .to_string()
                 .ends_with("the database cannot be written")
         );
+        // Other 5xx statuses count as no usable answer.
         let broken = as_unhealthy(refused(StatusCode::INTERNAL_SERVER_ERROR).into());
         assert_eq!(Exit::of(&broken), Exit::Unreachable);
     }

@@ -31,6 +31,7 @@ export function parseEncoding(fields: Fields, samples: number): ColumnEncoding {
     name: fields.text("name"),
     unit: fields.has("unit") ? fields.text("unit") : "",
     scale: fields.number("scale"),
+    // Not only up to 2, which `decodeColumn` knows: columns that the page does not need are skipped without decoding.
     order: fields.integer("order", 0, 9),
     first: fields.integer("first", 0, samples),
     count: fields.integer("count", 0, samples),

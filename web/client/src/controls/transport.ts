@@ -48,6 +48,7 @@ export class Transport {
       if (place !== "") element.classList.add(place);
       return element;
     };
+    // Only times of games have minutes.
     const isGame = format.hasMinutes;
     this.element = h(
       "div",

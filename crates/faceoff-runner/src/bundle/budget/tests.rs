@@ -41,8 +41,8 @@ fn timeout_is_a_platform_fault_and_cancellation_is_none() {
 fn links_with_short_names_are_counted() {
     let (now, never) = (Instant::now, || false);
     let budget = Budget::new(&LIMITS, &now, &never);
-    // Each name counts as LOOKUP_BYTES_PER_NAME more bytes, so after this name exactly one empty name fits.
-    let bytes_before_limit = usize::try_from(MAX_LINK_BYTES - 2 * LOOKUP_BYTES_PER_NAME).unwrap();
+    // Each name counts as EXTRA_BYTES_PER_NAME more bytes, so after this name exactly one empty name fits.
+    let bytes_before_limit = usize::try_from(MAX_LINK_BYTES - 2 * EXTRA_BYTES_PER_NAME).unwrap();
     budget.count_link_bytes(bytes_before_limit).unwrap();
     budget.count_link_bytes(0).unwrap();
     let message = budget
