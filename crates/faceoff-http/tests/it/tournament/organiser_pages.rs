@@ -278,7 +278,7 @@ async fn teams_leave_by_a_decision_of_organisers() {
     let mut grace = organiser(&cup.site, "Grace").await;
     let page = cup.path.replace("/api/v1", "/organiser");
     let (effects, target) = decide(&mut grace, &page, "disqualify-team").await;
-    let outcome = "A will be disqualified for good and will rank below all others. ";
+    let outcome = "The team A will be disqualified for good and will rank below all others. ";
     assert!(effects.starts_with(outcome), "{effects}");
     assert!(effects.contains(". 2 of its games, and"), "{effects}");
     assert_eq!(target, format!("{page}?done=team-left"));
