@@ -1,8 +1,11 @@
 //! Other load on the host (the evaluator's machine): it causes no penalty point and no fault, and changes no score. Reference
 //! agents of the folder `agents` are evaluated with the time limits of the rules, beside each kind of load.
 
-use crate::{Team, shared_folder::copy_folder, start_day, without_times};
-use faceoff_tests::{bundle, server::Server};
+use crate::{Team, start_day, without_times};
+use faceoff_tests::{
+    bundle::{self, copy_folder},
+    server::Server,
+};
 use serde_json::Value;
 use std::{
     fs,

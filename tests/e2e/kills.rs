@@ -2,10 +2,13 @@
 //! evaluation in *shards* (jobs of some episodes) and commits each shard's results to its database. The moments of the kills
 //! are drawn in advance and counted in entries of the server's log, so they are the same on quick and slow machines.
 
-use crate::{Team, shared_folder::copy_folder, without_times};
+use crate::{Team, without_times};
 use arrow_array::RecordBatch;
 use bytes::Bytes;
-use faceoff_tests::{bundle, server::Server};
+use faceoff_tests::{
+    bundle::{self, copy_folder},
+    server::Server,
+};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::Value;
 use std::{

@@ -1,7 +1,7 @@
 //! Commands of an ordinary user, who may not make control groups: their own agents run with the other layers of the sandbox.
 
-use crate::{shared_folder::copy_folder, without_times};
-use faceoff_tests::{bundle::pack, program, repository};
+use crate::without_times;
+use faceoff_tests::{bundle::copy_folder, bundle::pack, program, repository};
 use serde_json::Value;
 use std::{
     fs::{self, Permissions},

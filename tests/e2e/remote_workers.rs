@@ -17,10 +17,16 @@ mod shutdown;
 use crate::{
     Team, dataset, entry, evaluation_path,
     kills::{Archive, assert_same, wait_for_outcome},
-    shared_folder::{copy_folder, shared_folder},
+    shared_folder::shared_folder,
     start_day,
 };
-use faceoff_tests::{bundle, nats::Nats, relay::Relay, server::Server, worker::Worker};
+use faceoff_tests::{
+    bundle::{self, copy_folder},
+    nats::Nats,
+    relay::Relay,
+    server::Server,
+    worker::Worker,
+};
 use serde_json::{Value, json};
 use std::{
     fs,

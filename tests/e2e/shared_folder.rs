@@ -2,16 +2,22 @@
 //! each test copies it.
 
 use crate::CONFIG;
-use faceoff_tests::server::Server;
+use faceoff_tests::{bundle::copy_folder, server::Server};
 use std::{
     fs::{self, File},
     path::{Path, PathBuf},
-    process,
+    sync::LazyLock,
     time::Duration,
 };
+use uuid::Uuid;
 
 /// Folders of other test runs are removed after this time. No run takes as long.
 const MAX_AGE: Duration = Duration::from_hours(24);
+
+/// Names this test run. `cargo test` has no name for it, but runs all tests in one process.
+static RUN: LazyLock<String> = LazyLock::new(|| {
+    std::env::var("NEXTEST_RUN_ID").unwrap_or_else(|_| Uuid::now_v7().to_string())
+});
 
 /// The folder of this name. The first test that asks for it in a test run calls `make`, which fills it; other tests wait meanwhile. Tests
 /// copy what they change.
@@ -20,9 +26,7 @@ const MAX_AGE: Duration = Duration::from_hours(24);
 /// If the folder cannot be made. The next test tries it again.
 pub(crate) fn shared_folder(name: &str, make: impl FnOnce(&Path)) -> PathBuf {
     let runs = Path::new(env!("CARGO_TARGET_TMPDIR")).join("shared-folders");
-    // `cargo test` runs all tests in one process.
-    let run = std::env::var("NEXTEST_RUN_ID").unwrap_or_else(|_| process::id().to_string());
-    let run = runs.join(run);
+    let run = runs.join(RUN.as_str());
     if !run.exists() {
         remove_old(&runs);
     }
@@ -69,18 +73,4 @@ pub(crate) fn start_prepared(
     copy_folder(&shared.join("data"), &data_dir);
     let path = fs::read_to_string(shared.join("path")).expect("the path was written");
     (Server::start(&data_dir, CONFIG), path)
-}
-
-/// Copies a folder with its subfolders.
-pub(crate) fn copy_folder(from: &Path, to: &Path) {
-    fs::create_dir_all(to).expect("a scratch folder can be made");
-    for entry in fs::read_dir(from).expect("a folder can be read") {
-        let entry = entry.expect("a folder can be read");
-        let (from, to) = (entry.path(), to.join(entry.file_name()));
-        if from.is_dir() {
-            copy_folder(&from, &to);
-        } else {
-            fs::copy(&from, &to).expect("a scratch file can be copied");
-        }
-    }
 }

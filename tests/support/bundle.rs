@@ -75,18 +75,21 @@ pub fn python_bundle(folder: &Path, name: &str, source: &str) -> PathBuf {
     bundle
 }
 
-/// Copies a folder of files.
+/// Copies a folder with its subfolders.
 ///
 /// # Panics
-/// If it has subfolders or cannot be copied.
-#[must_use]
-pub(crate) fn copy_folder(folder: &Path, target: &Path) -> PathBuf {
-    fs::create_dir_all(target).expect("a scratch folder can be made");
-    for entry in fs::read_dir(folder).expect("the folder is there") {
+/// If it cannot be copied.
+pub fn copy_folder(from: &Path, to: &Path) {
+    fs::create_dir_all(to).expect("a scratch folder can be made");
+    for entry in fs::read_dir(from).expect("a folder can be read") {
         let entry = entry.expect("a folder can be read");
-        fs::copy(entry.path(), target.join(entry.file_name())).expect("the folder has files only");
+        let (from, to) = (entry.path(), to.join(entry.file_name()));
+        if from.is_dir() {
+            copy_folder(&from, &to);
+        } else {
+            fs::copy(&from, &to).expect("a scratch file can be copied");
+        }
     }
-    target.to_path_buf()
 }
 
 /// Packs the folder as a `.tar.gz`.

@@ -37,10 +37,8 @@ pub fn python3_ml() -> PathBuf {
 /// If it cannot be copied.
 #[must_use]
 pub fn test_bundle(name: &str, scratch: &Path) -> PathBuf {
-    let folder = copy_folder(
-        &repository().join("tests/bundles").join(name),
-        &scratch.join(name),
-    );
+    let folder = scratch.join(name);
+    copy_folder(&repository().join("tests/bundles").join(name), &folder);
     let protocol = repository().join("agents/hold/protocol.py");
     fs::copy(protocol, folder.join("protocol.py")).expect("a scratch file can be written");
     folder

@@ -3,9 +3,15 @@
 //! recorded motion of an episode; only episodes whose outcome differs from that in the ideal simulator have one.
 
 use super::{local_config, resume, server_config, worker_config};
-use crate::{Team, commands::admin, shared_folder::copy_folder};
+use crate::{Team, commands::admin};
 use bytes::Bytes;
-use faceoff_tests::{bundle, nats::Nats, relay::Relay, server::Server, worker::Worker};
+use faceoff_tests::{
+    bundle::{self, copy_folder},
+    nats::Nats,
+    relay::Relay,
+    server::Server,
+    worker::Worker,
+};
 use serde_json::{Value, json};
 use std::{path::Path, thread, time::Duration};
 

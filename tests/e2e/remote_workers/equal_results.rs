@@ -3,10 +3,12 @@
 use super::{
     EPISODES, ReferenceRun, many_shards, resume, server_config, wait_for_workers, worker_config,
 };
-use crate::{Team, shared_folder::copy_folder};
+use crate::Team;
 use async_nats::Message;
 use bytes::Bytes;
-use faceoff_tests::{nats::Nats, relay::Relay, repository, server::Server, worker::Worker};
+use faceoff_tests::{
+    bundle::copy_folder, nats::Nats, relay::Relay, repository, server::Server, worker::Worker,
+};
 use faceoff_wire::remote::{RemoteJob, WorkerRequest};
 use futures::StreamExt as _;
 use std::{thread, time::Duration};
