@@ -208,6 +208,7 @@ fn import_of_a_higher_level_is_found() {
     assert_eq!(violations("`rows`, `views` → `pages`"), [""; 0]);
     let unlisted = violations("`rows`, `views`, `boards`");
     assert_eq!(unlisted.len(), 2, "{unlisted:?}");
+    // `*` stands for all modules that are in no other level: here `pages` and `views`.
     assert_eq!(violations("`rows` → *"), upward);
 }
 

@@ -447,7 +447,7 @@ fn upload_quota_is_per_team_and_reported_in_bytes() {
         .expect("the server answers");
     assert_refused(without_length, 409, "stored-quota-spent", stored_bytes);
 
-    // Refused uploads do not count as stored, but count for the day.
+    // Invalid bundles do not count as stored, but count for the day.
     let mut truncated = bundle.clone();
     truncated.truncate(bundle_bytes / 2);
     for _ in 0..3 {
@@ -460,6 +460,10 @@ fn upload_quota_is_per_team_and_reported_in_bytes() {
         let verdict = other.verdict(&server, &id);
         assert_eq!(verdict["state"], "valid", "{verdict:#}");
     }
+    // Of the day's five bundles, the invalid ones (three halves) and two valid ones leave less than two. The daily quota is
+    // checked before that of stored bundles.
+    let over_day = server.upload(&other.token, bundle.repeat(2));
+    assert_refused(over_day, 429, "day-quota-spent", day_bytes);
 }
 
 /// Runs `faceoff submit` through a relay, which breaks connections.

@@ -48,7 +48,7 @@ impl Defend {
         };
         let time_left = plan.time - scene.time;
         if time_left < 0.5 * scene.dt {
-            return MalletCommand::coast(scene, plan.velocity, Posture::Free);
+            return MalletCommand::coast(scene, plan.velocity, Posture::Any);
         }
         MalletCommand::new(
             Target {
@@ -56,7 +56,7 @@ impl Defend {
                 vel: plan.velocity,
                 time: time_left,
             },
-            Posture::Free,
+            Posture::Any,
         )
     }
 }

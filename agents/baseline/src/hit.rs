@@ -111,7 +111,7 @@ impl Hit {
                 end_time: scene.time + STOP_TIME,
                 pos: scene.field.clamp_mallet(pos),
             };
-            return MalletCommand::coast(scene, scene.mallet.vel, Posture::Free);
+            return MalletCommand::coast(scene, scene.mallet.vel, Posture::Any);
         }
         let mut command = MalletCommand::new(
             Target {

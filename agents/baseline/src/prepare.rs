@@ -136,7 +136,7 @@ impl Prepare {
                 vel: PUSH_SPEED * normal,
                 time: time_left,
             };
-            return MalletCommand::new(target, Posture::Free);
+            return MalletCommand::new(target, Posture::Any);
         }
         let braking_left = STOP_TIME + time_left;
         if braking_left < scene.dt {
@@ -150,7 +150,7 @@ impl Prepare {
             vel: Vec2::zeros(),
             time: braking_left,
         };
-        MalletCommand::new(target, Posture::Free)
+        MalletCommand::new(target, Posture::Any)
     }
 }
 

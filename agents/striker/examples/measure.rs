@@ -87,13 +87,17 @@ fn main() -> anyhow::Result<()> {
         let mut tally = Tally::default();
         for season in first_season..first_season + seasons {
             let seed = Seed::from_number(season);
-            let plant = Plant::for_factors(profile.factors(), &settings, seed.model_mismatch());
+            let plant = Plant::for_perturbations(
+                profile.active_perturbations(),
+                &settings,
+                seed.model_mismatch(),
+            );
             let mut agent = new_agent(task)?;
             for index in 0..episodes {
                 let mut episode = Episode::new(
                     task,
                     Interpolation::Cubic,
-                    profile.factors(),
+                    profile.active_perturbations(),
                     &settings,
                     &plant,
                     seed.episode(task, index),

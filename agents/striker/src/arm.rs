@@ -41,7 +41,7 @@ pub enum Posture {
     /// possible.
     Strike(Side),
     /// No preference.
-    Free,
+    Any,
 }
 
 /// To which side of the vertical plane through base and mallet the elbow leans.
@@ -130,7 +130,7 @@ impl Arm {
         // A strike begins at rest, where both distributions of the motion agree. After it the weight fades.
         self.least_peak_weight = match posture {
             Posture::Strike(_) => 1.0,
-            Posture::Ready(_) | Posture::Free => {
+            Posture::Ready(_) | Posture::Any => {
                 (self.least_peak_weight - self.dt / STRIKE_FADE_TIME).max(0.0)
             }
         };
@@ -222,7 +222,7 @@ impl Arm {
     /// Changes the speeds towards the preferred posture, no faster than the acceleration bound, and returns them.
     fn update_posture_speed(&mut self, posture: Posture, position: Vec2) -> Joints {
         let desired = match posture {
-            Posture::Free => Joints::zeros(),
+            Posture::Any => Joints::zeros(),
             // A strike is over before the posture could follow.
             Posture::Strike(_) => Joints::zeros(),
             Posture::Ready(side) => POSTURE_RATE * (self.strike_posture(position, side) - self.q),

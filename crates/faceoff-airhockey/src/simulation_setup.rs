@@ -1,8 +1,8 @@
 //! The setup of simulations: the settings that all episodes of an evaluation, or all rallies of a game, have in common.
 
 use faceoff_sim::{
-    AirHockeyProfile, AirHockeyRuleset, AirHockeyTask, Bounds, Episode, Factors, Game, GameSetup,
-    Interpolation, PerturbationSettings, Plant,
+    ActivePerturbations, AirHockeyProfile, AirHockeyRuleset, AirHockeyTask, Bounds, Episode, Game,
+    GameSetup, Interpolation, PerturbationSettings, Plant,
 };
 use faceoff_types::{Seed, Task};
 
@@ -12,7 +12,7 @@ use faceoff_types::{Seed, Task};
 pub struct SimulationSetup {
     bounds: Bounds,
     /// The active kinds of perturbations.
-    factors: Factors,
+    active_perturbations: ActivePerturbations,
     /// The magnitudes of the perturbations.
     magnitudes: PerturbationSettings,
     plant: Plant,
@@ -43,11 +43,11 @@ impl SimulationSetup {
         seed: Seed,
         mismatch_seed: Seed,
     ) -> Self {
-        let factors = profile.factors();
+        let active_perturbations = profile.active_perturbations();
         Self {
             bounds: Bounds::of(ruleset),
-            plant: Plant::for_factors(factors, magnitudes, mismatch_seed),
-            factors,
+            plant: Plant::for_perturbations(active_perturbations, magnitudes, mismatch_seed),
+            active_perturbations,
             magnitudes: magnitudes.clone(),
             seed,
         }
@@ -75,7 +75,7 @@ impl SimulationSetup {
         Episode::new(
             task,
             interpolation,
-            self.factors,
+            self.active_perturbations,
             &self.magnitudes,
             &self.plant,
             self.episode_seed(task, index),
@@ -88,7 +88,7 @@ impl SimulationSetup {
     pub fn game(&self, interpolation: [Interpolation; 2]) -> Game {
         Game::new(GameSetup {
             interpolation,
-            factors: self.factors,
+            active_perturbations: self.active_perturbations,
             settings: self.magnitudes.clone(),
             plant: self.plant.clone(),
             seed: self.seed,

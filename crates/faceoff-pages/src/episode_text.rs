@@ -61,7 +61,7 @@ pub(super) fn plain_end(summary: &EpisodeIndexEntry, contacts: &[Contact]) -> St
         }
         ("hit", "crossed_middle", false) => return missed_shot_text(contacts),
         ("hit", "horizon", false) => "No goal before the time was up.",
-        ("defend", _, true) => "Stopped: the puck came to rest where the agent can play it.",
+        ("defend", _, true) => "Stopped: at the end the puck was where the agent can play it.",
         ("defend", "crossed_middle", false) => {
             "Not stopped: the puck was sent back across the middle."
         }

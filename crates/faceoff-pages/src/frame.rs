@@ -73,7 +73,8 @@ impl Frame {
             has_tournaments: app.has_tournaments.load(Ordering::Relaxed),
             ruleset: Some(app.config.competition().ruleset()),
             subject: Some(app.config.competition().subject.clone()),
-            ..Self::new(season, current)
+            season,
+            ..Self::without_season(current)
         }
         .with_preview(app)
     }
@@ -113,10 +114,10 @@ impl Frame {
         }
     }
 
-    /// The frame of a page without anything from the store, such as a page of an error.
-    pub(super) fn new(season: String, current: impl Into<String>) -> Self {
+    /// The frame of a page without anything from the store, such as a page of an error: the season's name is left out.
+    pub(super) fn without_season(current: impl Into<String>) -> Self {
         Self {
-            season,
+            season: String::new(),
             notice: None,
             archived_notice: None,
             ruleset: None,
@@ -222,7 +223,7 @@ impl IntoResponse for PageProblem {
     fn into_response(self) -> Response {
         let kind = self.0.kind();
         let page = ProblemPage {
-            frame: Frame::new(String::new(), ""),
+            frame: Frame::without_season(""),
             title: kind.title(),
             detail: format::sentence(self.0.detail()),
             status: kind.status().as_u16(),

@@ -14,7 +14,7 @@ struct Page {
 
 pub(super) async fn page() -> Result<Response, PageProblem> {
     render(&Page {
-        frame: Frame::new(String::new(), "/problems"),
+        frame: Frame::without_season("/problems"),
         kinds: ProblemKind::ALL,
     })
 }

@@ -92,7 +92,7 @@ pub(super) async fn embedded(
 ) -> Result<Response, PageProblem> {
     let view = EpisodeReplay::load(&app, Viewer::Visitor, path?).await?;
     let mut response = render(&EmbeddedPage {
-        frame: Frame::new(String::new(), ""),
+        frame: Frame::without_season(""),
         view: EpisodeReplay {
             replay: ReplaySection {
                 observed_url: None,

@@ -3,8 +3,8 @@
 
 use crate::errors::{argument_error, catch_panic, simulator_error};
 use faceoff_sim::{
-    Batch as SimBatch, BatchSetup, Factors, Interpolation, JOINTS, PerturbationSettings, Plant,
-    model::INITIAL_Q,
+    ActivePerturbations, Batch as SimBatch, BatchSetup, Interpolation, JOINTS,
+    PerturbationSettings, Plant, model::INITIAL_Q,
 };
 use faceoff_types::Seed;
 use pyo3::prelude::*;
@@ -33,7 +33,7 @@ impl Batch {
                 batch: SimBatch::new(BatchSetup {
                     task,
                     interpolation: Interpolation::Cubic,
-                    factors: Factors::NONE,
+                    active_perturbations: ActivePerturbations::NONE,
                     settings: PerturbationSettings::default(),
                     plant: Plant::nominal(),
                     seed: Seed::from_number(0),

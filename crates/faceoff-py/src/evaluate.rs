@@ -62,8 +62,10 @@ impl Evaluation {
             Some(text) => parse_seed("mismatch_seed", text)?,
             None => seed.model_mismatch(),
         };
-        let settings: PerturbationSettings = serde_json::from_str(perturbations)
-            .map_err(|error| argument_error("perturbations", "magnitudes of factors", error))?;
+        let settings: PerturbationSettings =
+            serde_json::from_str(perturbations).map_err(|error| {
+                argument_error("perturbations", "magnitudes of perturbations", error)
+            })?;
         let magnitudes = check_perturbations(&settings)?;
         let setup = py.detach(|| {
             catch_panic(|| {

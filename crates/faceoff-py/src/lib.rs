@@ -30,9 +30,9 @@ use pyo3::prelude::*;
 mod _native {
     use crate::{
         errors::{argument_error, catch_panic},
-        games::{GAME_FACTS, GAME_STATE_LEN, RALLY_ENDS},
+        games::{GAME_INFO_LEN, GAME_STATE_LEN, RALLY_ENDS},
         observation::BOUNDS,
-        outputs::FACTS,
+        outputs::EPISODE_INFO_LEN,
         world::STATE_LEN,
     };
     use faceoff_types::EPISODE_STEPS;
@@ -95,8 +95,8 @@ mod _native {
         let ends = faceoff_sim::episode::ends::ALL.map(|end| end.to_string());
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
         module.add("ENDS", ends)?;
-        module.add("FACTS", FACTS)?;
-        module.add("GAME_FACTS", GAME_FACTS)?;
+        module.add("EPISODE_INFO_LEN", EPISODE_INFO_LEN)?;
+        module.add("GAME_INFO_LEN", GAME_INFO_LEN)?;
         module.add("GAME_STATE_LEN", GAME_STATE_LEN)?;
         module.add("RALLY_ENDS", RALLY_ENDS)?;
         module.add("STATE_LEN", STATE_LEN)?;

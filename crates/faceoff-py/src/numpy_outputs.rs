@@ -2,14 +2,14 @@
 
 use crate::{
     errors::argument_error,
-    outputs::{FACTS, Outputs},
+    outputs::{EPISODE_INFO_LEN, Outputs},
     world::STATE_LEN,
 };
 use numpy::{PyReadwriteArray1, PyReadwriteArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 /// Arrays with a row per world, allocated by the Python half: observations, final observations, rewards, terminated,
-/// truncated, facts, true states and next true states; see [`Outputs`].
+/// truncated, episode infos, true states and next true states; see [`Outputs`].
 #[derive(FromPyObject)]
 pub struct NumpyOutputs<'py>(
     PyReadwriteArray2<'py, f32>,
@@ -34,7 +34,7 @@ impl NumpyOutputs<'_> {
             rewards,
             terminated,
             truncated,
-            facts,
+            episode_info,
             states,
             next_states,
         ) = self;
@@ -68,7 +68,12 @@ impl NumpyOutputs<'_> {
         check_vector("rewards", rewards.len())?;
         check_vector("terminated", terminated.len())?;
         check_vector("truncated", truncated.len())?;
-        check_matrix("facts", facts.shape(), FACTS, false)?;
+        check_matrix(
+            "episode_info",
+            episode_info.shape(),
+            EPISODE_INFO_LEN,
+            false,
+        )?;
         check_matrix("states", states.shape(), STATE_LEN, true)?;
         check_matrix("next states", next_states.shape(), STATE_LEN, true)?;
         Ok(Outputs {
@@ -78,7 +83,7 @@ impl NumpyOutputs<'_> {
             rewards: rewards.as_slice_mut()?,
             terminated: terminated.as_slice_mut()?,
             truncated: truncated.as_slice_mut()?,
-            facts: facts.as_slice_mut()?,
+            episode_info: episode_info.as_slice_mut()?,
             states: states.as_slice_mut()?,
             next_states: next_states.as_slice_mut()?,
         })

@@ -1,5 +1,5 @@
-//! Output arrays of a step, a row per world, in memory of Python or of this crate. The *facts* of a world are 12 numbers
-//! about its episode, such as its number of steps and its constraint values.
+//! Output arrays of a step, a row per world, in memory of Python or of this crate. The *episode info* of a world is 12 numbers:
+//! how its episode ended, whether it succeeded, its number and steps, its constraint values, and which constraints were violated.
 
 use crate::{
     observation,
@@ -9,8 +9,8 @@ use crate::{
 use faceoff_sim::episode::ends;
 use rayon::prelude::*;
 
-/// Count of numbers in a world's row of facts; see [`write_facts`].
-pub const FACTS: usize = 12;
+/// Count of numbers in a world's episode info; see [`write_episode_info`].
+pub const EPISODE_INFO_LEN: usize = 12;
 
 /// The output arrays: the rows of all worlds, or of consecutive ones.
 pub struct Outputs<'a> {
@@ -27,8 +27,8 @@ pub struct Outputs<'a> {
     pub terminated: &'a mut [bool],
     /// [worlds]: whether the horizon ended the episode.
     pub truncated: &'a mut [bool],
-    /// [worlds][[`FACTS`]]: see [`write_facts`].
-    pub facts: &'a mut [f64],
+    /// [worlds][[`EPISODE_INFO_LEN`]]: see [`write_episode_info`].
+    pub episode_info: &'a mut [f64],
     /// [worlds][[`STATE_LEN`]]: the true state after the step. Empty if not requested.
     pub states: &'a mut [f64],
     /// [worlds][[`STATE_LEN`]]: the present true state, that of the new episode if one has begun. Empty if not
@@ -46,7 +46,7 @@ impl<'a> Outputs<'a> {
         let mut rewards = self.rewards.chunks_mut(worlds);
         let mut terminated = self.terminated.chunks_mut(worlds);
         let mut truncated = self.truncated.chunks_mut(worlds);
-        let mut facts = self.facts.chunks_mut(FACTS * worlds);
+        let mut episode_info = self.episode_info.chunks_mut(EPISODE_INFO_LEN * worlds);
         let mut states = self.states.chunks_mut(STATE_LEN * worlds);
         let mut next_states = self.next_states.chunks_mut(STATE_LEN * worlds);
         (0..count)
@@ -57,7 +57,7 @@ impl<'a> Outputs<'a> {
                 rewards: rewards.next().unwrap_or_default(),
                 terminated: terminated.next().unwrap_or_default(),
                 truncated: truncated.next().unwrap_or_default(),
-                facts: facts.next().unwrap_or_default(),
+                episode_info: episode_info.next().unwrap_or_default(),
                 states: states.next().unwrap_or_default(),
                 next_states: next_states.next().unwrap_or_default(),
             })
@@ -71,7 +71,11 @@ impl<'a> Outputs<'a> {
         self.write_current_state(row, world);
         let values = world.episode.constraints();
         let constraints = [values.ee, values.link, values.joint_pos, values.joint_vel];
-        write_facts(world, &constraints, &mut self.facts[row * FACTS..][..FACTS]);
+        write_episode_info(
+            world,
+            &constraints,
+            &mut self.episode_info[row * EPISODE_INFO_LEN..][..EPISODE_INFO_LEN],
+        );
         self.rewards[row] = 0.0;
         self.terminated[row] = false;
         self.truncated[row] = false;
@@ -108,26 +112,26 @@ impl<'a> Outputs<'a> {
     }
 }
 
-/// Writes a world's facts: the code of the episode's end (−1 while it runs), success, the episode's number, its steps, the
+/// Writes a world's episode info: the code of the episode's end (−1 while it runs), success, the episode's number, its steps, the
 /// values of the constraints ee, link, joint_pos and joint_vel, and whether each was violated in this episode.
-pub fn write_facts(world: &World, constraints: &[f64; 4], facts: &mut [f64]) {
+pub fn write_episode_info(world: &World, constraints: &[f64; 4], episode_info: &mut [f64]) {
     let violations = world.episode.violations();
     let code = |end| (0..).zip(ends::ALL).find(|(_, other)| *other == end);
-    facts[0] = world
+    episode_info[0] = world
         .end
         .and_then(code)
         .map_or(-1.0, |(code, _): (u8, _)| f64::from(code));
-    facts[1] = f64::from(u8::from(world.succeeds()));
-    facts[2] = f64::from(world.episode_start.number);
-    facts[3] = f64::from(world.episode.steps());
-    facts[4..8].copy_from_slice(constraints);
-    for (fact, is_violated) in facts[8..].iter_mut().zip([
+    episode_info[1] = f64::from(u8::from(world.succeeds()));
+    episode_info[2] = f64::from(world.episode_start.number);
+    episode_info[3] = f64::from(world.episode.steps());
+    episode_info[4..8].copy_from_slice(constraints);
+    for (number, is_violated) in episode_info[8..].iter_mut().zip([
         violations.ee,
         violations.link,
         violations.joint_pos,
         violations.joint_vel,
     ]) {
-        *fact = f64::from(u8::from(is_violated));
+        *number = f64::from(u8::from(is_violated));
     }
 }
 
@@ -139,7 +143,7 @@ pub struct OwnedOutputs {
     rewards: Vec<f64>,
     terminated: Vec<bool>,
     truncated: Vec<bool>,
-    facts: Vec<f64>,
+    episode_info: Vec<f64>,
     states: Vec<f64>,
     next_states: Vec<f64>,
 }
@@ -156,7 +160,7 @@ impl OwnedOutputs {
             rewards: vec![0.0; worlds],
             terminated: vec![false; worlds],
             truncated: vec![false; worlds],
-            facts: vec![0.0; worlds * FACTS],
+            episode_info: vec![0.0; worlds * EPISODE_INFO_LEN],
             states: vec![0.0; states_len],
             next_states: vec![0.0; states_len],
         }
@@ -171,7 +175,7 @@ impl OwnedOutputs {
             rewards: &mut self.rewards,
             terminated: &mut self.terminated,
             truncated: &mut self.truncated,
-            facts: &mut self.facts,
+            episode_info: &mut self.episode_info,
             states: &mut self.states,
             next_states: &mut self.next_states,
         }
@@ -183,7 +187,7 @@ impl OwnedOutputs {
         to.rewards.copy_from_slice(&self.rewards);
         to.terminated.copy_from_slice(&self.terminated);
         to.truncated.copy_from_slice(&self.truncated);
-        to.facts.copy_from_slice(&self.facts);
+        to.episode_info.copy_from_slice(&self.episode_info);
         copy_if_present(&self.final_observations, to.final_observations);
         copy_if_present(&self.states, to.states);
         copy_if_present(&self.next_states, to.next_states);

@@ -1,14 +1,16 @@
 //! Setup shared by all worlds of an environment.
 //!
-//! A *factor* is one kind of perturbation, a difference from the ideal simulator. A *plant* is a simulated arm; with the
-//! factor `model_mismatch` its masses, gains and friction deviate from the model, by random numbers from a seed.
+//! A *perturbation* is one kind of difference from the ideal simulator. A *plant* is a simulated arm; with the perturbation
+//! `model_mismatch` its masses, gains and friction deviate from the model, by random numbers from a seed.
 
 use crate::{
     actions::{ActionFormat, ActionMode},
     errors::{argument_error, check_perturbations},
 };
 use faceoff_sim::AirHockeyTask;
-use faceoff_sim::{Episode, Factor, Factors, Interpolation, PerturbationSettings, Plant};
+use faceoff_sim::{
+    ActivePerturbations, Episode, Interpolation, Perturbation, PerturbationSettings, Plant,
+};
 use faceoff_types::{EPISODE_STEPS, Seed};
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -26,9 +28,10 @@ pub struct Setup {
     pub action_mode: ActionMode,
     /// Clip numbers to their bounds instead of refusing them.
     pub clip_actions: bool,
-    /// Active factors of perturbation.
-    pub factors: Vec<Factor>,
-    /// Magnitudes of the factors.
+    /// The active perturbations. In JSON, which pickled states contain, they have their earlier name.
+    #[serde(rename = "factors")]
+    pub active_perturbations: Vec<Perturbation>,
+    /// Magnitudes of the perturbations.
     pub perturbations: PerturbationSettings,
     /// Seed of the plant; `None` draws the plant of each world from the world's seed.
     pub mismatch_seed: Option<Seed>,
@@ -50,15 +53,17 @@ impl Setup {
                 setup.max_episode_steps,
             ));
         }
-        check_magnitudes(&setup.factors, &setup.perturbations)?;
+        check_magnitudes(&setup.active_perturbations, &setup.perturbations)?;
         Ok(setup)
     }
 
-    /// The factors as a set.
-    pub fn factor_set(&self) -> Factors {
-        self.factors
+    /// The active perturbations as a set.
+    pub fn active_set(&self) -> ActivePerturbations {
+        self.active_perturbations
             .iter()
-            .fold(Factors::NONE, |set, factor| set.with(*factor))
+            .fold(ActivePerturbations::NONE, |set, perturbation| {
+                set.with(*perturbation)
+            })
     }
 
     /// The format of this setup's actions.
@@ -78,7 +83,7 @@ impl Setup {
     /// The plant of a world with this seed.
     pub fn plant(&self, seed: Seed) -> Plant {
         let mismatch_seed = self.mismatch_seed.unwrap_or_else(|| seed.model_mismatch());
-        Plant::for_factors(self.factor_set(), &self.perturbations, mismatch_seed)
+        Plant::for_perturbations(self.active_set(), &self.perturbations, mismatch_seed)
     }
 
     /// A new episode; `puck` replaces its initial state of the puck.
@@ -89,15 +94,22 @@ impl Setup {
         number: u32,
         puck: Option<[f64; 6]>,
     ) -> Episode {
-        let (factors, settings) = (self.factor_set(), &self.perturbations);
+        let (active_perturbations, settings) = (self.active_set(), &self.perturbations);
         let (task, interpolation) = (self.task, self.interpolation);
         let seed = seed.episode(task, number);
         match puck {
-            None => Episode::new(task, interpolation, factors, settings, plant, seed),
+            None => Episode::new(
+                task,
+                interpolation,
+                active_perturbations,
+                settings,
+                plant,
+                seed,
+            ),
             Some(puck) => Episode::with_initial_puck(
                 task,
                 interpolation,
-                factors,
+                active_perturbations,
                 settings,
                 plant,
                 seed,
@@ -118,7 +130,7 @@ pub fn read_json<T: DeserializeOwned>(json: &str) -> PyResult<T> {
         PerturbationSettings::deserialize(magnitudes).map_err(|error| {
             argument_error(
                 "perturbations",
-                "magnitudes of factors by their names",
+                "magnitudes of perturbations by their names",
                 error,
             )
         })?;
@@ -130,10 +142,13 @@ pub fn read_json<T: DeserializeOwned>(json: &str) -> PyResult<T> {
 ///
 /// # Errors
 /// If they are invalid.
-pub fn check_magnitudes(factors: &[Factor], magnitudes: &PerturbationSettings) -> PyResult<()> {
+pub fn check_magnitudes(
+    active_perturbations: &[Perturbation],
+    magnitudes: &PerturbationSettings,
+) -> PyResult<()> {
     check_perturbations(magnitudes)?;
     // Thousands of unsuccessful draws would look like a hang.
-    if factors.contains(&Factor::ModelMismatch)
+    if active_perturbations.contains(&Perturbation::ModelMismatch)
         && magnitudes.model_mismatch != PerturbationSettings::default().model_mismatch
         && !Plant::can_be_drawn(magnitudes, Seed::from_number(0))
     {

@@ -2,7 +2,7 @@
 
 use crate::{
     errors::argument_error,
-    outputs::{FACTS, Outputs, write_facts},
+    outputs::{EPISODE_INFO_LEN, Outputs, write_episode_info},
     setup::Setup,
     world::World,
 };
@@ -71,8 +71,8 @@ pub fn step(
         outputs.rewards[row] = result.reward;
         outputs.terminated[row] = !matches!(world.end, None | Some(EpisodeEnd::HORIZON));
         outputs.truncated[row] = world.end == Some(EpisodeEnd::HORIZON);
-        let facts = &mut outputs.facts[row * FACTS..][..FACTS];
-        write_facts(world, &result.constraints, facts);
+        let episode_info = &mut outputs.episode_info[row * EPISODE_INFO_LEN..][..EPISODE_INFO_LEN];
+        write_episode_info(world, &result.constraints, episode_info);
         outputs.write_state_after_step(row, world);
         if world.end.is_some() && autoreset == Autoreset::SameStep {
             outputs.write_final_observation(row, world);

@@ -29,7 +29,7 @@ ARGUMENTS: list[tuple[dict[str, Any], str]] = [
     ({"profile": ["noise"]}, "profile: expected one of model_mismatch"),
     ({"profile": 1}, "profile: expected"),
     ({"perturbations": [1]}, "perturbations: expected a mapping"),
-    ({"perturbations": {"noise": {}}}, "perturbations: expected magnitudes of factors by their names, got unknown field"),
+    ({"perturbations": {"noise": {}}}, "perturbations: expected magnitudes of perturbations by their names, got unknown field"),
     ({"perturbations": {"tracking_loss": {"probability": 2.0}}}, "expected a number from 0 to 1, got 2"),
     ({"perturbations": {"tracking_loss": {"probability": float("nan")}}}, r"perturbations['tracking_loss']['probability']: expected finite"),
     ({"mismatch_seed": "ff"}, "mismatch_seed: expected a number or 64 hexadecimal digits"),

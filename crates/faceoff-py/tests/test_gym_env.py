@@ -157,7 +157,7 @@ def test_seeds_have_their_own_robot_without_a_mismatch_seed() -> None:
     np.testing.assert_array_equal(settled_pose(1, mismatch_seed=4), settled_pose(2, mismatch_seed=4))
 
 
-def test_profile_accepts_names_of_factors() -> None:
+def test_profile_accepts_names_of_perturbations() -> None:
     def first(profile: Any, **arguments: Any) -> np.ndarray:
         return AirHockeyEnv("defend", profile=profile, **arguments).reset(seed=3)[0]
 

@@ -186,7 +186,7 @@ impl ComparedEvaluation<'_> {
     ///
     /// On the same episodes the paired test decides. On other episodes of the same kind (another day) the 95 % interval of
     /// the difference, for independent episodes, decides: zero must lie outside of it. Under different rules or
-    /// perturbations the result is always true, since there is no evidence of a tie.
+    /// perturbations nothing can be compared, and the result is always true: such evaluations are never in one rank group.
     #[must_use]
     pub fn differs_significantly(&self, other: &Self, task: Option<Task>) -> bool {
         let is_selected = |candidate: &Task| task.is_none_or(|task| task == *candidate);

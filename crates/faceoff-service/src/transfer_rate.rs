@@ -99,11 +99,16 @@ mod tests {
         let mut guard = TransferRateGuard::new(RATE);
         guard.record_bytes(usize::MAX);
         assert_eq!(guard.remaining(), RATE.grace);
-        let no_minimum = MinTransferRate {
+    }
+
+    #[test]
+    fn zero_rate_counts_as_one_byte_per_second() {
+        // Divided by zero, each byte would earn the whole grace.
+        let zero_rate = MinTransferRate {
             bytes_per_s: 0,
             ..RATE
         };
-        let mut guard = TransferRateGuard::new(no_minimum);
+        let mut guard = TransferRateGuard::new(zero_rate);
         guard.record_wait(RATE.grace);
         guard.record_bytes(1);
         assert_eq!(guard.remaining(), Duration::from_secs(1));

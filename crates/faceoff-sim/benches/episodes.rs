@@ -3,8 +3,8 @@
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
-    Batch, BatchSetup, Command, Episode, Factors, Game, GameSetup, Interpolation, JOINTS,
-    PerturbationSettings, Plant, model::INITIAL_Q,
+    ActivePerturbations, Batch, BatchSetup, Command, Episode, Game, GameSetup, Interpolation,
+    JOINTS, PerturbationSettings, Plant, model::INITIAL_Q,
 };
 use faceoff_types::Seed;
 use std::hint::black_box;
@@ -19,16 +19,16 @@ fn episode(c: &mut Criterion) {
     let settings = PerturbationSettings::default();
     let mut group = c.benchmark_group("control_step");
     group.throughput(Throughput::Elements(STEPS));
-    for (name, factors) in [
-        ("ideal", Factors::NONE),
-        ("evaluation", Factors::EVALUATION),
+    for (name, active_perturbations) in [
+        ("ideal", ActivePerturbations::NONE),
+        ("evaluation", ActivePerturbations::EVALUATION),
     ] {
-        let plant = Plant::for_factors(factors, &settings, Seed::from_number(0));
+        let plant = Plant::for_perturbations(active_perturbations, &settings, Seed::from_number(0));
         for task in AirHockeyTask::ALL {
             let episode = Episode::new(
                 task,
                 Interpolation::Cubic,
-                factors,
+                active_perturbations,
                 &settings,
                 &plant,
                 Seed::from_number(0).episode(task, 0),
@@ -54,7 +54,7 @@ fn game(c: &mut Criterion) {
     let hold = Interpolation::Cubic.hold_position(&INITIAL_Q);
     let mut game = Game::new(GameSetup {
         interpolation: [Interpolation::Cubic; 2],
-        factors: Factors::NONE,
+        active_perturbations: ActivePerturbations::NONE,
         settings: PerturbationSettings::default(),
         plant: Plant::nominal(),
         seed: Seed::from_number(0),
@@ -81,7 +81,7 @@ fn batch(c: &mut Criterion) {
         let mut batch = Batch::new(BatchSetup {
             task: AirHockeyTask::Prepare,
             interpolation: Interpolation::Cubic,
-            factors: Factors::NONE,
+            active_perturbations: ActivePerturbations::NONE,
             settings: PerturbationSettings::default(),
             plant: Plant::nominal(),
             seed: Seed::from_number(0),

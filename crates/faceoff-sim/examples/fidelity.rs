@@ -72,6 +72,7 @@ fn draw_arm(file: &Path) -> DrawResult {
         let mut simulated = vec![];
         for (step, action) in case["actions"].as_array().unwrap().iter().enumerate() {
             world.command(0, interpolation, &flat(action));
+            // No air flow: no force on the puck.
             world.control_step(|_| [0.0; 2]);
             let t = CONTROL_STEP_S * (step + 1) as f64;
             let difference = max_difference(&recorded[step + 1], &world.joints(0));

@@ -6,7 +6,7 @@
 
 use crate::AirHockeyTask;
 use crate::{
-    Factors,
+    ActivePerturbations,
     channel::observation::OBSERVATION_WITH_OPPONENT_LEN,
     dynamics::simd_level::SimdLevel,
     episode::{Episode, StepOutcome},
@@ -27,10 +27,10 @@ pub struct BatchSetup {
     /// How actions become trajectories.
     pub interpolation: Interpolation,
     /// The active kinds of perturbations.
-    pub factors: Factors,
+    pub active_perturbations: ActivePerturbations,
     /// Magnitudes of the perturbations.
     pub settings: PerturbationSettings,
-    /// The physical properties of the arms; nominal unless the factors contain the model mismatch.
+    /// The physical properties of the arms; nominal unless the active perturbations contain the model mismatch.
     pub plant: Plant,
     /// Seed of the evaluation whose episodes the batch runs.
     pub seed: Seed,
@@ -180,7 +180,7 @@ impl BatchSetup {
         let episode = Episode::new(
             self.task,
             self.interpolation,
-            self.factors,
+            self.active_perturbations,
             &self.settings,
             &self.plant,
             seed,

@@ -24,7 +24,7 @@ fn compute() -> String {
         let mut episode = Episode::new(
             task,
             Interpolation::Cubic,
-            AirHockeyProfile::Evaluation.factors(),
+            AirHockeyProfile::Evaluation.active_perturbations(),
             &settings,
             &plant,
             seed.episode(task, 0),

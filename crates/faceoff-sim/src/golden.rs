@@ -78,13 +78,16 @@ pub fn play_game(profile: AirHockeyProfile) -> (Golden, Game) {
 /// A golden episode at its start.
 #[must_use]
 pub fn start_episode(task: AirHockeyTask, profile: AirHockeyProfile) -> Episode {
-    let (factors, settings) = (profile.factors(), PerturbationSettings::default());
+    let (active_perturbations, settings) = (
+        profile.active_perturbations(),
+        PerturbationSettings::default(),
+    );
     let root = Seed::from_number(SEED);
-    let plant = Plant::for_factors(factors, &settings, root.model_mismatch());
+    let plant = Plant::for_perturbations(active_perturbations, &settings, root.model_mismatch());
     Episode::new(
         task,
         Interpolation::Cubic,
-        factors,
+        active_perturbations,
         &settings,
         &plant,
         root.episode(task, 0),
@@ -92,12 +95,15 @@ pub fn start_episode(task: AirHockeyTask, profile: AirHockeyProfile) -> Episode 
 }
 
 fn start_game(profile: AirHockeyProfile) -> Game {
-    let (factors, settings) = (profile.factors(), PerturbationSettings::default());
+    let (active_perturbations, settings) = (
+        profile.active_perturbations(),
+        PerturbationSettings::default(),
+    );
     let seed = Seed::from_number(SEED);
     Game::new(GameSetup {
         interpolation: [Interpolation::Cubic; 2],
-        factors,
-        plant: Plant::for_factors(factors, &settings, seed.model_mismatch()),
+        active_perturbations,
+        plant: Plant::for_perturbations(active_perturbations, &settings, seed.model_mismatch()),
         settings,
         seed,
     })

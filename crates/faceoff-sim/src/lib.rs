@@ -52,8 +52,8 @@ pub use fingerprint::simulator_fingerprint;
 pub use game::{Game, GameSetup, GameState, GameStep, referee::RallyEnd};
 pub use interpolation::{Interpolation, JOINTS, MAX_ACTION_LEN, SUBSTEPS, UnknownInterpolation};
 pub use perturbation::{
-    AirHockeyProfile, DelaySettings, DisturbanceSettings, Factor, Factors, MismatchSettings,
-    NoiseSettings, PerturbationSettings, TrackingLossSettings,
+    ActivePerturbations, AirHockeyProfile, DelaySettings, DisturbanceSettings, MismatchSettings,
+    NoiseSettings, Perturbation, PerturbationSettings, TrackingLossSettings,
 };
 pub use robot::plant::Plant;
 pub use ruleset::AirHockeyRuleset;

@@ -77,7 +77,7 @@ impl Seed {
         self.derive("extra", evaluation.as_uuid().as_bytes())
     }
 
-    /// Season secret → the seed of all evaluations of a trial, which do not count.
+    /// Season secret → the seed of all evaluations of a trial: a rehearsal by organisers that does not count, stored as a proposal.
     #[must_use]
     pub fn trial(&self, proposal: ProposalId) -> Self {
         self.derive("trial", proposal.as_uuid().as_bytes())

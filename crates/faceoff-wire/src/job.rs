@@ -3,6 +3,9 @@
 //!
 //! A job carries the seeds of its own episodes, never the season's secret from which they are derived. So a worker learns nothing
 //! about the episodes of other days.
+//!
+//! Fields and variants with `serde(rename)` keep their JSON names of earlier versions, such as `unit` for a job and `smoke` for a
+//! validation run: NATS stores messages, so after an upgrade the server and its workers must still read each other's messages.
 
 use crate::game::GameSpec;
 use faceoff_types::{

@@ -1,4 +1,4 @@
-//! Periodic removal of data that is no longer needed.
+//! Periodic removal of data that is no longer needed, and periodic storing of derived data.
 
 use crate::{ablation_clips, boxed, episode_summaries};
 use faceoff_scoring::EpisodeSummary;
@@ -10,7 +10,10 @@ use std::sync::Arc;
 /// Upper bound of the time that writing an artifact takes.
 const LONGEST_WRITE: SignedDuration = SignedDuration::from_hours(1);
 
-/// Removes obsolete recordings, the data of old runs and half-written files, and keeps the database's write-ahead log short.
+/// Removes what is no longer needed: recordings, the shards of finished runs, datasets of dropped proposals, webhook deliveries, ended
+/// credentials, half-written files, bundles that are invalid or of no submission, and files beyond the stages' retentions. Stores what is
+/// missing: episode summaries, the joined clips of ablations, and sizes of datasets. Keeps the database's write-ahead log short.
+///
 /// Failures are logged, and retried by the next call.
 #[boxed]
 pub async fn clean_up(store: &Store, competition: &Arc<Competition>, clock: &Clock) {

@@ -18,15 +18,21 @@ const SEASON_SEED: u64 = 101;
 fn count_successes(task: AirHockeyTask, agent_task: striker::Task) -> u32 {
     let season = Seed::from_number(SEASON_SEED);
     let settings = PerturbationSettings::default();
-    let factors = AirHockeyProfile::Evaluation.factors();
-    let plant = Plant::for_factors(factors, &settings, season.model_mismatch());
+    let active_perturbations = AirHockeyProfile::Evaluation.active_perturbations();
+    let plant = Plant::for_perturbations(active_perturbations, &settings, season.model_mismatch());
     let (robots, robot_index) = (2, 0);
     let mut agent = Baseline::new(agent_task, &env(robots, robot_index));
     let mut successes = 0;
     for index in 0..EPISODES {
         let seed = season.episode(task, index);
-        let mut episode =
-            Episode::new(task, Interpolation::Cubic, factors, &settings, &plant, seed);
+        let mut episode = Episode::new(
+            task,
+            Interpolation::Cubic,
+            active_perturbations,
+            &settings,
+            &plant,
+            seed,
+        );
         agent.reset();
         loop {
             let action = agent

@@ -67,7 +67,7 @@ fn motions_above_speed_limits_are_slowed_on_a_straight_path() {
         arm.advance(
             Vec2::new(tip.x + 0.05, tip.y),
             Vec2::new(5.0, 0.0),
-            Posture::Free,
+            Posture::Any,
         );
     }
     let tip = pose(&arm).tip;
@@ -134,7 +134,7 @@ fn sagging_arm_is_corrected() {
         let commanded = Joints::from(arm.action()[0]);
         arm.observe(&(commanded + sag));
         let tip = pose(&arm).tip;
-        arm.advance(Vec2::new(tip.x, tip.y), Vec2::zeros(), Posture::Free);
+        arm.advance(Vec2::new(tip.x, tip.y), Vec2::zeros(), Posture::Any);
     }
     let reached = Joints::from(arm.action()[0]) + sag;
     assert!((forward(&reached).tip.z - HEIGHT_M).abs() < 1e-3);

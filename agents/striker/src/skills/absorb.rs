@@ -76,7 +76,7 @@ impl Absorb {
             if time_left <= 0.5 * scene.dt {
                 // Continue through the contact and a little longer with the puck, then stop.
                 if time_left > -0.04 {
-                    return Some(MalletCommand::coast(scene, plan.velocity, Posture::Free));
+                    return Some(MalletCommand::coast(scene, plan.velocity, Posture::Any));
                 }
                 self.interception = None;
                 return Some(MalletCommand::brake(scene));
@@ -89,7 +89,7 @@ impl Absorb {
             && imminent.is_none_or(|plan| (plan.velocity - velocity).norm() > PLAN_TOLERANCE)
         {
             self.interception = None;
-            return Some(MalletCommand::coast(scene, velocity, Posture::Free));
+            return Some(MalletCommand::coast(scene, velocity, Posture::Any));
         }
         if let Some(plan) = imminent {
             return Some(move_to(scene, &plan));
@@ -186,7 +186,7 @@ fn move_to(scene: &Scene<'_>, plan: &Interception) -> MalletCommand {
             vel: plan.velocity,
             time,
         },
-        Posture::Free,
+        Posture::Any,
     )
 }
 

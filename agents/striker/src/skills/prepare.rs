@@ -197,7 +197,7 @@ impl Prepare {
                     vel: Vec2::zeros(),
                     time: braking_left,
                 },
-                Posture::Free,
+                Posture::Any,
             );
         }
         let mut puck_at_contact = scene.puck;
@@ -209,7 +209,7 @@ impl Prepare {
                 vel: strike.velocity,
                 time: time_left,
             },
-            Posture::Free,
+            Posture::Any,
         )
     }
 }

@@ -20,9 +20,15 @@ fn play(task: AirHockeyTask) -> (u32, u32) {
     let (mut successes, mut points) = (0, 0);
     for index in 0..EPISODES {
         let seed = season.episode(task, index);
-        let factors = AirHockeyProfile::Evaluation.factors();
-        let mut episode =
-            Episode::new(task, Interpolation::Cubic, factors, &settings, &plant, seed);
+        let active_perturbations = AirHockeyProfile::Evaluation.active_perturbations();
+        let mut episode = Episode::new(
+            task,
+            Interpolation::Cubic,
+            active_perturbations,
+            &settings,
+            &plant,
+            seed,
+        );
         agent.reset();
         loop {
             let action = agent

@@ -94,8 +94,12 @@ pub fn new_game(profile: AirHockeyProfile, seed: u64) -> Game {
     let settings = PerturbationSettings::default();
     Game::new(GameSetup {
         interpolation: [Interpolation::Cubic; 2],
-        factors: profile.factors(),
-        plant: Plant::for_factors(profile.factors(), &settings, seed.model_mismatch()),
+        active_perturbations: profile.active_perturbations(),
+        plant: Plant::for_perturbations(
+            profile.active_perturbations(),
+            &settings,
+            seed.model_mismatch(),
+        ),
         settings,
         seed,
     })

@@ -12,9 +12,11 @@ pub struct EpisodesQuery {
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub task: String,
     /// `success` or `failure`.
+    // `went` is its earlier name, in old links.
     #[serde(default, alias = "went", skip_serializing_if = "String::is_empty")]
     pub outcome: String,
     /// The limit that the episode violated: a kind of violation of the competition, `any` of these, or the time of an answer (`late`).
+    // `broke` is its earlier name, in old links.
     #[serde(default, alias = "broke", skip_serializing_if = "String::is_empty")]
     pub violated: String,
     /// How the episode ended.

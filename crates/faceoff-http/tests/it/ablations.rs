@@ -82,6 +82,7 @@ async fn ablation_results_are_shown_to_team_and_visitors() {
     assert_eq!((hit.len(), &hit[0]["profile"]), (6, &json!("ideal")));
     let tracking_loss = &hit[4];
     assert_eq!(tracking_loss["profile"], "tracking_loss");
+    // `lost` counts the episodes that succeed in `ideal` only.
     assert_eq!(
         (&tracking_loss["difference"], &tracking_loss["lost"]),
         (&json!(-1.0), &json!(8))

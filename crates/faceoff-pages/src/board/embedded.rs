@@ -53,7 +53,7 @@ pub(crate) async fn page(State(app): State<App>) -> Result<Response, PageProblem
     }
     groups.retain(|group| !group.rows.is_empty());
     let mut response = render(&Page {
-        frame: Frame::new(String::new(), ""),
+        frame: Frame::without_season(""),
         style: assets::FRONT_STYLE.url(),
         title: competition.title.clone(),
         stage: board.stage_name.to_string(),

@@ -1,4 +1,4 @@
-//! The colours of cards: those of the pages on a light ground, from their style sheet.
+//! The colours of cards (pictures of link previews): those of the pages on a light ground, from their style sheet.
 
 use crate::assets;
 use std::{collections::BTreeMap, sync::OnceLock};

@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn single_day_is_centred_and_missing_days_are_described() {
+    fn single_day_is_centred_and_empty_chart_says_so() {
         let chart = DayChart::from_percent("Score", &[value(1, 50.0)]);
         assert_eq!((chart.points.len(), chart.days.len()), (1, 1));
         assert_eq!(chart.points[0].x, "192.0");

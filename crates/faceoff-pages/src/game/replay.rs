@@ -75,7 +75,7 @@ pub(crate) async fn embedded(
     let clips = GameClips::find(&app, Viewer::Visitor, id).await?;
     let analysis = clips.analysis(&app, result.steps).await?;
     let mut response = render(&EmbeddedPage {
-        frame: Frame::new(String::new(), ""),
+        frame: Frame::without_season(""),
         id,
         replay: GameReplay {
             observed_url: None,

@@ -1,6 +1,6 @@
 """Checks of arguments, and the environment setup that the native half (`faceoff._native`, compiled from Rust) reads.
 
-A *factor* is one kind of perturbation, a difference from the ideal simulator; a *profile* is a set of active factors.
+A *perturbation* is one kind of difference from the ideal simulator; a *profile* is a set of active perturbations.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ ActionMode = Literal["delta", "absolute", "raw"]
 
 TASKS: tuple[Task, ...] = ("hit", "defend", "prepare")
 ACTION_MODES: tuple[ActionMode, ...] = ("delta", "absolute", "raw")
-FACTORS = ("model_mismatch", "observation_noise", "disturbance", "tracking_loss", "delay")
+PERTURBATIONS = ("model_mismatch", "observation_noise", "disturbance", "tracking_loss", "delay")
 PROFILES: dict[str, tuple[str, ...]] = {
     "ideal": (),
-    **{factor: (factor,) for factor in FACTORS},
-    "evaluation": FACTORS[:4],
+    **{perturbation: (perturbation,) for perturbation in PERTURBATIONS},
+    "evaluation": PERTURBATIONS[:4],
 }
 #: Seeds are below this, so that they fit into int64 arrays.
 SEED_BOUND = 2**63
@@ -142,16 +142,16 @@ def interpolation_code(value: object) -> int | None:
     return code
 
 
-def factor_names(profile: object) -> list[str]:
-    """The factors of a named profile, or of a sequence of factor names, in the order of ``FACTORS``."""
+def perturbation_names(profile: object) -> list[str]:
+    """The perturbations of a named profile, or of a sequence of their names, in the order of ``PERTURBATIONS``."""
     if isinstance(profile, str):
         return list(PROFILES[one_of("profile", profile, PROFILES)])
     if not isinstance(profile, Iterable):
         raise ArgumentTypeError(
-            f"profile: expected a profile's name or names of factors, got {profile!r}"
+            f"profile: expected a profile's name or names of perturbations, got {profile!r}"
         )
-    names = [one_of("profile", name, FACTORS) for name in profile]
-    return [factor for factor in FACTORS if factor in names]
+    names = [one_of("profile", name, PERTURBATIONS) for name in profile]
+    return [perturbation for perturbation in PERTURBATIONS if perturbation in names]
 
 
 def perturbations_json(perturbations: object) -> Any:
@@ -216,7 +216,8 @@ def write_setup(
         "interpolation": interpolation_code(interpolation),
         "action_mode": one_of("action_mode", action_mode, ACTION_MODES),
         "clip_actions": flag("clip_actions", clip_actions),
-        "factors": factor_names(profile),
+        # "factors" is the earlier word for perturbations, which pickled states contain.
+        "factors": perturbation_names(profile),
         "perturbations": perturbations_json(perturbations),
         "mismatch_seed": mismatch_seed_text(mismatch_seed),
         "max_episode_steps": integer("max_episode_steps", horizon, 1, steps),

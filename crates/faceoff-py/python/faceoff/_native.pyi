@@ -7,12 +7,12 @@ import numpy.typing as npt
 
 __version__: str
 ENDS: list[str]
-#: Numbers in a world's row of facts; ``faceoff.gym.rows.Rows`` names them.
-FACTS: int
+#: Numbers in a world's episode info; ``faceoff.gym.rows.Rows`` names them.
+EPISODE_INFO_LEN: int
 #: Numbers in a true state; ``faceoff.gym.reward.State`` names them.
 STATE_LEN: int
-#: Numbers in a game's row of facts; ``faceoff.game.batch.GameRows`` names them.
-GAME_FACTS: int
+#: Numbers in a game's info; ``faceoff.game.batch.GameResults`` names them.
+GAME_INFO_LEN: int
 #: Numbers in the true state of a game.
 GAME_STATE_LEN: int
 RALLY_ENDS: list[str]

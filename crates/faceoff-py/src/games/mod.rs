@@ -5,7 +5,7 @@ mod rows;
 mod settings;
 mod snapshot;
 
-pub use rows::{GAME_FACTS, GAME_STATE_LEN, RALLY_ENDS};
+pub use rows::{GAME_INFO_LEN, GAME_STATE_LEN, RALLY_ENDS};
 pub use snapshot::{GameSnapshot, load_game};
 
 use crate::{

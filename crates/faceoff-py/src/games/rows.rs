@@ -1,5 +1,5 @@
-//! Output arrays of the games' steps, a row per game, in memory of Python. The *facts* of a game are 23 numbers about its
-//! last step.
+//! Output arrays of the games' steps, a row per game, in memory of Python. The *info* of a game is 23 numbers about its last
+//! step, such as the score.
 
 use super::game::ReplayableGame;
 use crate::{errors::argument_error, observation};
@@ -11,11 +11,11 @@ use numpy::{PyReadwriteArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-/// Names of the reasons why a rally ends; their positions are the codes in [`GameRow::write_facts`].
+/// Names of the reasons why a rally ends; their positions are the codes in [`GameRow::write_game_info`].
 pub const RALLY_ENDS: [&str; 5] = ["goal", "foul", "stuck", "left_table", "diverged"];
 
-/// Count of numbers in a game's row of facts; see [`GameRow::write_facts`].
-pub const GAME_FACTS: usize = 23;
+/// Count of numbers in a game's info; see [`GameRow::write_game_info`].
+pub const GAME_INFO_LEN: usize = 23;
 
 /// Count of numbers in a true state: the puck's 6 in the table frame; for each robot its joint positions and velocities (7
 /// each), and the end effector's 3 in its own base frame.
@@ -23,7 +23,7 @@ pub const GAME_STATE_LEN: usize = 6 + 2 * (2 * JOINTS + 3);
 
 const OBSERVATIONS_LEN: usize = 2 * OBSERVATION_WITH_OPPONENT_LEN;
 
-/// The arrays, allocated by the Python half: observations, final observations, facts, true states. The first two have two rows per
+/// The arrays, allocated by the Python half: observations, final observations, infos, true states. The first two have two rows per
 /// game, robot 1 first; the others have one.
 #[derive(FromPyObject)]
 pub struct GameArrays<'py>(
@@ -37,7 +37,7 @@ pub struct GameArrays<'py>(
 pub struct GameRow<'a> {
     observations: &'a mut [f32],
     final_observations: &'a mut [f32],
-    facts: &'a mut [f64],
+    game_info: &'a mut [f64],
     state: &'a mut [f64],
 }
 
@@ -47,7 +47,7 @@ impl GameArrays<'_> {
     /// # Errors
     /// If an array has another shape or is not contiguous.
     pub fn rows(&mut self, games: usize) -> PyResult<Vec<GameRow<'_>>> {
-        let Self(observations, finals, facts, states) = self;
+        let Self(observations, finals, game_info, states) = self;
         let check_shape = |name, shape: &[usize], rows, width| {
             if shape == [rows, width] {
                 return Ok(());
@@ -62,22 +62,22 @@ impl GameArrays<'_> {
         let width = OBSERVATION_WITH_OPPONENT_LEN;
         check_shape("observations", observations.shape(), 2 * games, width)?;
         check_shape("final observations", finals.shape(), 2 * games, width)?;
-        check_shape("facts", facts.shape(), games, GAME_FACTS)?;
+        check_shape("game_info", game_info.shape(), games, GAME_INFO_LEN)?;
         check_shape("states", states.shape(), games, GAME_STATE_LEN)?;
         let observations = observations
             .as_slice_mut()?
             .chunks_exact_mut(OBSERVATIONS_LEN);
         let finals = finals.as_slice_mut()?.chunks_exact_mut(OBSERVATIONS_LEN);
-        let facts = facts.as_slice_mut()?.chunks_exact_mut(GAME_FACTS);
+        let game_info = game_info.as_slice_mut()?.chunks_exact_mut(GAME_INFO_LEN);
         let states = states.as_slice_mut()?.chunks_exact_mut(GAME_STATE_LEN);
         Ok(observations
             .zip(finals)
-            .zip(facts.zip(states))
+            .zip(game_info.zip(states))
             .map(
-                |((observations, final_observations), (facts, state))| GameRow {
+                |((observations, final_observations), (game_info, state))| GameRow {
                     observations,
                     final_observations,
-                    facts,
+                    game_info,
                     state,
                 },
             )
@@ -91,8 +91,8 @@ impl GameRow<'_> {
         write_both(&game.simulation, self.observations);
         self.state
             .copy_from_slice(&flatten(&game.simulation.state()));
-        self.facts.fill(0.0);
-        self.facts[..2].fill(-1.0);
+        self.game_info.fill(0.0);
+        self.game_info[..2].fill(-1.0);
         self.write_counts(game, [0; 2]);
     }
 
@@ -100,7 +100,7 @@ impl GameRow<'_> {
     pub fn write_step(&mut self, game: &ReplayableGame, step: &GameStep, points: [u32; 2]) {
         write_both(&game.simulation, self.observations);
         self.state.copy_from_slice(&flatten(&step.state));
-        self.write_facts(game, step, points);
+        self.write_game_info(game, step, points);
     }
 
     /// Writes the observations of a new game; those of the game before it become the final ones.
@@ -109,10 +109,10 @@ impl GameRow<'_> {
         write_both(&next.simulation, self.observations);
     }
 
-    /// Code of the rally's end in [`RALLY_ENDS`] and the robot that brought it about (−1: none), 2 × 4 constraint values (ee,
+    /// Writes the game's info: code of the rally's end in [`RALLY_ENDS`] and the robot that brought it about (−1: none), 2 × 4 constraint values (ee,
     /// link, joint_pos, joint_vel), whether each robot has made the world diverge, goals, fouls, score, points of the
     /// step, control steps of the game, its number, and whether it is over.
-    fn write_facts(&mut self, game: &ReplayableGame, step: &GameStep, points: [u32; 2]) {
+    fn write_game_info(&mut self, game: &ReplayableGame, step: &GameStep, points: [u32; 2]) {
         let (code, by) = match step.rally_end {
             None => (-1.0, None),
             Some(RallyEnd::Goal { by }) => (0.0, Some(by)),
@@ -121,20 +121,20 @@ impl GameRow<'_> {
             Some(RallyEnd::LeftTable) => (3.0, None),
             Some(RallyEnd::Diverged { .. }) => (4.0, None),
         };
-        self.facts[0] = code;
-        self.facts[1] = by.map_or(-1.0, |robot| robot as f64);
-        for (values, facts) in step
+        self.game_info[0] = code;
+        self.game_info[1] = by.map_or(-1.0, |robot| robot as f64);
+        for (values, numbers) in step
             .constraints
             .iter()
-            .zip(self.facts[2..10].chunks_exact_mut(4))
+            .zip(self.game_info[2..10].chunks_exact_mut(4))
         {
-            facts.copy_from_slice(&[values.ee, values.link, values.joint_pos, values.joint_vel]);
+            numbers.copy_from_slice(&[values.ee, values.link, values.joint_pos, values.joint_vel]);
         }
         let diverged = step
             .divergence
             .map_or([false; 2], |divergence| divergence.robots_at_fault);
-        for (fact, has_diverged) in self.facts[10..12].iter_mut().zip(diverged) {
-            *fact = f64::from(u8::from(has_diverged));
+        for (number, has_diverged) in self.game_info[10..12].iter_mut().zip(diverged) {
+            *number = f64::from(u8::from(has_diverged));
         }
         self.write_counts(game, points);
     }
@@ -142,12 +142,12 @@ impl GameRow<'_> {
     fn write_counts(&mut self, game: &ReplayableGame, points: [u32; 2]) {
         let referee = game.simulation.referee();
         let counts = [referee.goals, referee.fouls, referee.score(), points];
-        for (fact, count) in self.facts[12..20].iter_mut().zip(counts.concat()) {
-            *fact = f64::from(count);
+        for (number, count) in self.game_info[12..20].iter_mut().zip(counts.concat()) {
+            *number = f64::from(count);
         }
-        self.facts[20] = f64::from(game.simulation.steps());
-        self.facts[21] = f64::from(game.origin.number);
-        self.facts[22] = f64::from(u8::from(game.is_over));
+        self.game_info[20] = f64::from(game.simulation.steps());
+        self.game_info[21] = f64::from(game.origin.number);
+        self.game_info[22] = f64::from(u8::from(game.is_over));
     }
 }
 

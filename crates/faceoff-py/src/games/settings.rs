@@ -4,7 +4,9 @@ use crate::{
     actions::{ActionFormat, ActionMode},
     setup::{check_magnitudes, read_json},
 };
-use faceoff_sim::{Factor, Factors, GameSetup, Interpolation, PerturbationSettings, Plant};
+use faceoff_sim::{
+    ActivePerturbations, GameSetup, Interpolation, Perturbation, PerturbationSettings, Plant,
+};
 use faceoff_types::Seed;
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -16,7 +18,9 @@ pub struct GameSettings {
     interpolation: [Interpolation; 2],
     action_mode: [ActionMode; 2],
     clip_actions: bool,
-    factors: Vec<Factor>,
+    // The earlier name, which pickled games contain.
+    #[serde(rename = "factors")]
+    active_perturbations: Vec<Perturbation>,
     perturbations: PerturbationSettings,
     /// Seed of the arms' deviation from their model; `None` derives it from the seed of each game.
     mismatch_seed: Option<Seed>,
@@ -33,7 +37,7 @@ impl GameSettings {
     /// If they are invalid.
     pub fn read(json: &str) -> PyResult<Self> {
         let settings: Self = read_json(json)?;
-        check_magnitudes(&settings.factors, &settings.perturbations)?;
+        check_magnitudes(&settings.active_perturbations, &settings.perturbations)?;
         Ok(settings)
     }
 
@@ -55,7 +59,7 @@ impl GameSettings {
     pub fn plant(&self, seed: u64) -> Plant {
         let seed = Seed::from_number(seed).model_mismatch();
         let mismatch_seed = self.mismatch_seed.unwrap_or(seed);
-        Plant::for_factors(self.factor_set(), &self.perturbations, mismatch_seed)
+        Plant::for_perturbations(self.active_set(), &self.perturbations, mismatch_seed)
     }
 
     /// The simulator's setup of game `number` of a seed; number 0 is the game of `faceoff play`.
@@ -63,7 +67,7 @@ impl GameSettings {
         let root = Seed::from_number(seed);
         GameSetup {
             interpolation: self.interpolation,
-            factors: self.factor_set(),
+            active_perturbations: self.active_set(),
             settings: self.perturbations.clone(),
             plant: plant.clone(),
             seed: match number {
@@ -73,9 +77,11 @@ impl GameSettings {
         }
     }
 
-    fn factor_set(&self) -> Factors {
-        self.factors
+    fn active_set(&self) -> ActivePerturbations {
+        self.active_perturbations
             .iter()
-            .fold(Factors::NONE, |set, factor| set.with(*factor))
+            .fold(ActivePerturbations::NONE, |set, perturbation| {
+                set.with(*perturbation)
+            })
     }
 }

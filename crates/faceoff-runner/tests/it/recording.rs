@@ -96,7 +96,9 @@ fn recording_matches_the_simulation() {
             let mut world = Episode::new(
                 task.try_into().unwrap(),
                 Interpolation::Cubic,
-                AirHockeyProfile::try_from(spec.profile).unwrap().factors(),
+                AirHockeyProfile::try_from(spec.profile)
+                    .unwrap()
+                    .active_perturbations(),
                 &settings,
                 &plant,
                 seed,

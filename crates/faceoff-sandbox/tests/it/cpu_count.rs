@@ -50,5 +50,6 @@ fn bundle_may_set_its_number_of_threads() {
     ] {
         subject.spec.env.insert(name.to_owned(), "7".to_owned());
     }
+    // `threads` has the distinct values of these variables.
     assert_eq!(subject.report()["threads"], json!(["7"]));
 }

@@ -279,7 +279,7 @@ fn unpaired_evaluations_are_compared_by_rates() {
     };
     assert!(
         first.differs_significantly(&other_rules, None),
-        "there is no evidence of a tie"
+        "evaluations under different rules are never statistically tied"
     );
 }
 

@@ -148,7 +148,8 @@ impl TournamentState {
         played_games.collect()
     }
 
-    /// The team whose departure excludes a game of a round or a replay from the standings, if there is one.
+    /// The team whose departure excludes a game from the standings, if there is one. The game may be of a round or of a
+    /// repetition of the schedule, in which all games are played again.
     pub fn excluded_by(&self, game: &Game) -> Result<Option<TeamName>, Problem> {
         let Some(schedule_entry) = game.purpose.schedule_entry() else {
             return Ok(None);
@@ -222,6 +223,7 @@ impl TournamentState {
                 let GamePurpose::Round(schedule_entry) = game.purpose else {
                     continue;
                 };
+                // The second game of a mirrored pair repeats the pairing with exchanged sides.
                 if schedule_entry.round != round.number || schedule_entry.second_half {
                     continue;
                 }

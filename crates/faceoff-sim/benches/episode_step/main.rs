@@ -11,8 +11,8 @@ mod recorded;
 
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
-    Batch, BatchSetup, Factors, Interpolation, JOINTS, PerturbationSettings, Plant, SUBSTEPS,
-    SimdLevel, model::INITIAL_Q,
+    ActivePerturbations, Batch, BatchSetup, Interpolation, JOINTS, PerturbationSettings, Plant,
+    SUBSTEPS, SimdLevel, model::INITIAL_Q,
 };
 use faceoff_types::Seed;
 use recorded::{RecordedEpisode, ReplayingWorlds, hold_still, record_striker};
@@ -32,21 +32,24 @@ fn main() {
     let filter = std::env::args().nth(1).filter(|arg| !arg.starts_with("--"));
     let is_wanted = |name: &str| filter.as_ref().is_none_or(|filter| name.contains(filter));
     println!("control steps/s (physics steps/s) of one core; speed-up over one by one");
-    for (profile, factors) in [
-        ("ideal", Factors::NONE),
-        ("evaluation", Factors::EVALUATION),
+    for (profile, active_perturbations) in [
+        ("ideal", ActivePerturbations::NONE),
+        ("evaluation", ActivePerturbations::EVALUATION),
     ] {
         for task in AirHockeyTask::ALL {
             let name = format!("held/{task}/{profile}");
             if is_wanted(&name) {
                 compare(
                     &name,
-                    &hold_still(task, factors, STEPS as u32, WORLDS as u32),
+                    &hold_still(task, active_perturbations, STEPS as u32, WORLDS as u32),
                 );
             }
             let name = format!("striker/{task}/{profile}");
             if is_wanted(&name) {
-                compare(&name, &record_striker(task, factors, 2 * WORLDS as u32));
+                compare(
+                    &name,
+                    &record_striker(task, active_perturbations, 2 * WORLDS as u32),
+                );
             }
         }
     }
@@ -103,7 +106,7 @@ fn batch() {
             let mut batch = Batch::new(BatchSetup {
                 task: AirHockeyTask::Prepare,
                 interpolation: Interpolation::Cubic,
-                factors: Factors::NONE,
+                active_perturbations: ActivePerturbations::NONE,
                 settings: PerturbationSettings::default(),
                 plant: Plant::nominal(),
                 seed: Seed::from_number(0),

@@ -2,8 +2,8 @@
 
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
-    Episode, Factors, Interpolation, PerturbationSettings, Plant, SimdLevel, StepOutcome, env_info,
-    model::INITIAL_Q, step_episodes_on,
+    ActivePerturbations, Episode, Interpolation, PerturbationSettings, Plant, SimdLevel,
+    StepOutcome, env_info, model::INITIAL_Q, step_episodes_on,
 };
 use faceoff_types::Seed;
 use striker::{Agent, Policy};
@@ -18,12 +18,12 @@ pub struct RecordedEpisode {
 /// Records episodes that `striker` plays to their ends.
 pub fn record_striker(
     task: AirHockeyTask,
-    factors: Factors,
+    active_perturbations: ActivePerturbations,
     episodes: u32,
 ) -> Vec<RecordedEpisode> {
     (0..episodes)
         .map(|number| {
-            let start = start_episode(task, factors, number);
+            let start = start_episode(task, active_perturbations, number);
             let mut agent = striker_for(task);
             let mut episode = start.clone();
             let mut actions = vec![];
@@ -41,7 +41,7 @@ pub fn record_striker(
 /// Records episodes in which the arm holds still, for at most `steps` control steps.
 pub fn hold_still(
     task: AirHockeyTask,
-    factors: Factors,
+    active_perturbations: ActivePerturbations,
     steps: u32,
     episodes: u32,
 ) -> Vec<RecordedEpisode> {
@@ -49,7 +49,7 @@ pub fn hold_still(
     let action = held[..Interpolation::Cubic.len()].to_vec();
     (0..episodes)
         .map(|number| {
-            let start = start_episode(task, factors, number);
+            let start = start_episode(task, active_perturbations, number);
             let mut episode = start.clone();
             let mut actions = vec![];
             while episode.steps() < steps {
@@ -64,12 +64,23 @@ pub fn hold_still(
 }
 
 /// The episode with this index, at its start.
-fn start_episode(task: AirHockeyTask, factors: Factors, number: u32) -> Episode {
+fn start_episode(
+    task: AirHockeyTask,
+    active_perturbations: ActivePerturbations,
+    number: u32,
+) -> Episode {
     let settings = PerturbationSettings::default();
     let seed = Seed::from_number(0);
-    let plant = Plant::for_factors(factors, &settings, seed.model_mismatch());
+    let plant = Plant::for_perturbations(active_perturbations, &settings, seed.model_mismatch());
     let seed = seed.episode(task, number);
-    Episode::new(task, Interpolation::Cubic, factors, &settings, &plant, seed)
+    Episode::new(
+        task,
+        Interpolation::Cubic,
+        active_perturbations,
+        &settings,
+        &plant,
+        seed,
+    )
 }
 
 /// The agent `striker` at the start of an episode of a task.

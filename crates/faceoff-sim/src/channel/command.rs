@@ -8,8 +8,8 @@ pub enum Command<'a> {
     /// [`Interpolation::len`]: crate::Interpolation::len
     Act(&'a [f64]),
     /// No answer arrived in time. The arm is commanded to hold its previous commanded position, with zero velocity. With
-    /// [`Factor::Delay`] (a kind of perturbation) it instead continues its last trajectory at constant velocity for 80 ms, then stops.
+    /// [`Perturbation::Delay`] it instead continues its last trajectory at constant velocity for 80 ms, then stops.
     ///
-    /// [`Factor::Delay`]: crate::Factor::Delay
+    /// [`Perturbation::Delay`]: crate::Perturbation::Delay
     Late,
 }

@@ -6,7 +6,8 @@ mod latency;
 pub mod observation;
 
 use crate::{
-    Factor, Factors, perturbation::noise::ObservationNoise, stream::RandomStream, world::World,
+    ActivePerturbations, Perturbation, perturbation::noise::ObservationNoise, stream::RandomStream,
+    world::World,
 };
 use crate::{Interpolation, PerturbationSettings};
 pub use command::Command;
@@ -26,29 +27,31 @@ pub struct AgentChannel {
 }
 
 impl AgentChannel {
-    /// The channel of a robot (0 or 1) in a world at its start. Each factor (kind of perturbation) and each robot has its own random
-    /// stream, derived from `seed` by the factor's name.
+    /// The channel of a robot (0 or 1) in a world at its start. Each perturbation and each robot has its own random stream,
+    /// derived from `seed` by the perturbation's name.
     #[must_use]
     pub fn new(
         robot: usize,
         interpolation: Interpolation,
-        factors: Factors,
+        active_perturbations: ActivePerturbations,
         settings: &PerturbationSettings,
         seed: &Seed,
         world: &World,
     ) -> Self {
-        let stream = |factor: Factor| {
-            factors.contains(factor).then(|| match robot {
-                0 => RandomStream::new(seed, factor.as_str()),
-                _ => RandomStream::new(seed, &format!("{factor}, robot {}", robot + 1)),
-            })
+        let stream = |perturbation: Perturbation| {
+            active_perturbations
+                .contains(perturbation)
+                .then(|| match robot {
+                    0 => RandomStream::new(seed, perturbation.as_str()),
+                    _ => RandomStream::new(seed, &format!("{perturbation}, robot {}", robot + 1)),
+                })
         };
         let mut channel = Self {
             robot,
             interpolation,
-            noise: stream(Factor::ObservationNoise)
+            noise: stream(Perturbation::ObservationNoise)
                 .map(|stream| ObservationNoise::new(&settings.observation_noise, stream)),
-            latency: stream(Factor::Delay)
+            latency: stream(Perturbation::Delay)
                 .map(|stream| Latency::new(&settings.delay, interpolation, stream)),
             observation: [0.0; OBSERVATION_WITH_OPPONENT_LEN],
         };

@@ -11,7 +11,7 @@ pub use air_hockey_task::AirHockeyTask;
 pub use task::EPISODE_STEPS;
 
 use crate::{
-    Factors,
+    ActivePerturbations,
     channel::{AgentChannel, Command, observation},
     model::JOINTS,
     perturbation::table_perturbations::TablePerturbations,
@@ -42,20 +42,28 @@ pub struct Episode {
 }
 
 impl Episode {
-    /// An episode at its start. `factors` are the active kinds of perturbations, `settings` their magnitudes. `plant` (the arms' physical
-    /// properties) is nominal unless the factors contain [`ModelMismatch`](crate::Factor::ModelMismatch); then the caller passes
-    /// [`Plant::mismatched`]. The initial state and each factor have their own random stream, derived from `seed` by name.
+    /// An episode at its start. `settings` are the magnitudes of the perturbations. `plant` (the arms' physical properties) is nominal
+    /// unless the active perturbations contain [`ModelMismatch`](crate::Perturbation::ModelMismatch); then the caller passes
+    /// [`Plant::mismatched`]. The initial state and each perturbation have their own random stream, derived from `seed` by name.
     #[must_use]
     pub fn new(
         task: AirHockeyTask,
         interpolation: Interpolation,
-        factors: Factors,
+        active_perturbations: ActivePerturbations,
         settings: &PerturbationSettings,
         plant: &Plant,
         seed: Seed,
     ) -> Self {
         let puck = task::initial_puck(task, &mut RandomStream::new(&seed, "initial_state"));
-        Self::with_initial_puck(task, interpolation, factors, settings, plant, seed, puck)
+        Self::with_initial_puck(
+            task,
+            interpolation,
+            active_perturbations,
+            settings,
+            plant,
+            seed,
+            puck,
+        )
     }
 
     /// As [`Episode::new`], with a given initial state of the puck: [x, y, yaw, vx, vy, yaw rate], table frame.
@@ -63,7 +71,7 @@ impl Episode {
     pub fn with_initial_puck(
         task: AirHockeyTask,
         interpolation: Interpolation,
-        factors: Factors,
+        active_perturbations: ActivePerturbations,
         settings: &PerturbationSettings,
         plant: &Plant,
         seed: Seed,
@@ -71,10 +79,17 @@ impl Episode {
     ) -> Self {
         let opponent = (task == AirHockeyTask::Hit).then(Opponent::new);
         let mut world = World::with_robots(plant, if opponent.is_some() { 2 } else { 1 }, puck);
-        let table = TablePerturbations::new(factors, settings, &seed, &mut world);
+        let table = TablePerturbations::new(active_perturbations, settings, &seed, &mut world);
         Self {
             task,
-            channel: AgentChannel::new(0, interpolation, factors, settings, &seed, &world),
+            channel: AgentChannel::new(
+                0,
+                interpolation,
+                active_perturbations,
+                settings,
+                &seed,
+                &world,
+            ),
             world,
             opponent,
             table,

@@ -6,9 +6,8 @@ mod state;
 
 pub use state::GameState;
 
-use crate::{AirHockeyRuleset, Interpolation, PerturbationSettings};
 use crate::{
-    Factors,
+    ActivePerturbations,
     channel::{AgentChannel, Command, observation::OBSERVATION_WITH_OPPONENT_LEN},
     episode::{
         constraints::{ConstraintValues, ViolatedConstraints},
@@ -19,6 +18,7 @@ use crate::{
     stream::RandomStream,
     world::{Bounds, Divergence, Impacts, World},
 };
+use crate::{AirHockeyRuleset, Interpolation, PerturbationSettings};
 use faceoff_types::{Seed, WINDOW_STEPS};
 use referee::{GAME_RULES, RallyEnd, Referee};
 
@@ -29,10 +29,10 @@ pub struct GameSetup {
     pub interpolation: [Interpolation; 2],
     /// The active kinds of perturbations. Both robots share the table, the puck's tracking and the plant; noise and delays are
     /// separate.
-    pub factors: Factors,
+    pub active_perturbations: ActivePerturbations,
     /// Magnitudes of the perturbations.
     pub settings: PerturbationSettings,
-    /// The physical properties of both arms; nominal unless the factors contain the model mismatch.
+    /// The physical properties of both arms; nominal unless the active perturbations contain the model mismatch.
     pub plant: Plant,
     /// The game's seed. The seed of each rally is derived from it and the rally's number.
     pub seed: Seed,
@@ -255,13 +255,18 @@ impl Rally {
         let x = if serving_robot == 0 { -x } else { x };
         let mut world = World::with_robots(&setup.plant, 2, [x, y, 0.0, 0.0, 0.0, 0.0]);
         world.set_bounds(bounds);
-        let table = TablePerturbations::new(setup.factors, &setup.settings, &seed, &mut world);
+        let table = TablePerturbations::new(
+            setup.active_perturbations,
+            &setup.settings,
+            &seed,
+            &mut world,
+        );
         let channels = [0, 1].map(|robot| {
             let interpolation = setup.interpolation[robot];
             AgentChannel::new(
                 robot,
                 interpolation,
-                setup.factors,
+                setup.active_perturbations,
                 &setup.settings,
                 &seed,
                 &world,

@@ -1,7 +1,7 @@
 //! The perturbation `model_mismatch`: the *plant* (the physical properties of the arm) deviates from the nominal model that agents know. It
 //! is drawn once per season.
 
-use crate::{Factor, Factors};
+use crate::{ActivePerturbations, Perturbation};
 use crate::{MismatchSettings, PerturbationSettings};
 use crate::{
     dynamics::arm::{Bodies, Kinematics, controller_torques, plant_bias},
@@ -33,12 +33,12 @@ const SAG_ROUNDS: usize = 12;
 impl Plant {
     /// The plant for these active perturbations: nominal, or that of the season with this mismatch seed.
     #[must_use]
-    pub fn for_factors(
-        factors: Factors,
+    pub fn for_perturbations(
+        active_perturbations: ActivePerturbations,
         settings: &PerturbationSettings,
         mismatch_seed: Seed,
     ) -> Self {
-        if factors.contains(Factor::ModelMismatch) {
+        if active_perturbations.contains(Perturbation::ModelMismatch) {
             Self::mismatched(settings, mismatch_seed)
         } else {
             Self::nominal()

@@ -1,5 +1,5 @@
 //! *Perturbations*: differences between the world of an evaluation and the ideal one that agents are developed in (`docs/rules.md`,
-//! "Perturbations"). Each kind is called a *factor* and has its own random stream.
+//! "Perturbations"). Each has its own random stream.
 
 pub mod disturbance;
 mod mismatch;
@@ -10,7 +10,7 @@ mod settings;
 pub mod table_perturbations;
 pub mod tracking_loss;
 
-pub use profile::{AirHockeyProfile, Factor, Factors};
+pub use profile::{ActivePerturbations, AirHockeyProfile, Perturbation};
 pub use settings::{
     DelaySettings, DisturbanceSettings, MismatchSettings, NoiseSettings, PerturbationSettings,
     TrackingLossSettings,

@@ -1,5 +1,5 @@
 //! Profiles: named sets of perturbations, that is, of deliberate differences between the evaluator's simulator and the
-//! one that teams have. Each single perturbation is called a factor.
+//! one that teams have.
 
 use faceoff_types::{Profile, UnknownProfile};
 use serde::{Deserialize, Serialize};
@@ -8,7 +8,7 @@ use std::{fmt, str::FromStr};
 /// One difference between the evaluator's simulator and the ideal one (`docs/rules.md`, "Perturbations").
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Factor {
+pub enum Perturbation {
     /// The plant's masses, gains and friction differ from the nominal model, once per season.
     ModelMismatch,
     /// Gaussian noise on everything that the agent observes.
@@ -17,13 +17,13 @@ pub enum Factor {
     Disturbance,
     /// The puck's pose freezes for some steps.
     TrackingLoss,
-    /// Delays, and tilt and friction of the table, as in a real laboratory. Not in [`Factor::EVALUATION`], since only the profile
+    /// Delays, and tilt and friction of the table, as in a real laboratory. Not in [`Perturbation::EVALUATION`], since only the profile
     /// `delay` uses it.
     Delay,
 }
 
-impl Factor {
-    /// The factors of the `evaluation` profile.
+impl Perturbation {
+    /// The perturbations of the `evaluation` profile.
     pub const EVALUATION: [Self; 4] = [
         Self::ModelMismatch,
         Self::ObservationNoise,
@@ -31,7 +31,7 @@ impl Factor {
         Self::TrackingLoss,
     ];
 
-    /// The name used in files and as the single-factor profile.
+    /// The name used in files; also that of the profile with this perturbation alone.
     #[must_use]
     pub const fn as_str(self) -> &'static str {
         match self {
@@ -44,37 +44,37 @@ impl Factor {
     }
 }
 
-impl fmt::Display for Factor {
+impl fmt::Display for Perturbation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.as_str())
     }
 }
 
-/// The set of active factors.
+/// The set of perturbations that are active in an episode or game.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub struct Factors(u8);
+pub struct ActivePerturbations(u8);
 
-impl Factors {
-    /// No factor: the simulator that the teams have.
+impl ActivePerturbations {
+    /// No perturbation: the simulator that the teams have.
     pub const NONE: Self = Self(0);
-    /// The four factors of the `evaluation` profile; not [`Factor::Delay`].
+    /// The four perturbations of the `evaluation` profile; not [`Perturbation::Delay`].
     pub const EVALUATION: Self = Self(0b1111);
 
     #[must_use]
-    pub const fn only(factor: Factor) -> Self {
-        Self(1 << factor as u8)
+    pub const fn only(perturbation: Perturbation) -> Self {
+        Self(1 << perturbation as u8)
     }
 
-    /// This set with one more factor.
+    /// This set with one more perturbation.
     #[must_use]
-    pub const fn with(self, factor: Factor) -> Self {
-        Self(self.0 | 1 << factor as u8)
+    pub const fn with(self, perturbation: Perturbation) -> Self {
+        Self(self.0 | 1 << perturbation as u8)
     }
 
-    /// Is the factor active?
+    /// Is the perturbation active?
     #[must_use]
-    pub const fn contains(self, factor: Factor) -> bool {
-        self.0 & (1 << factor as u8) != 0
+    pub const fn contains(self, perturbation: Perturbation) -> bool {
+        self.0 & (1 << perturbation as u8) != 0
     }
 }
 
@@ -96,7 +96,7 @@ pub enum AirHockeyProfile {
     TrackingLoss,
     /// Delays, and tilt and friction of the table, as in a real laboratory, alone.
     Delay,
-    /// The four factors together; used for evaluations that count.
+    /// Model mismatch, observation noise, disturbance and tracking loss together; used for evaluations that count.
     Evaluation,
 }
 
@@ -117,26 +117,26 @@ impl AirHockeyProfile {
     pub const fn name(self) -> Profile {
         Profile::new(match self {
             Self::Ideal => "ideal",
-            Self::ModelMismatch => Factor::ModelMismatch.as_str(),
-            Self::ObservationNoise => Factor::ObservationNoise.as_str(),
-            Self::Disturbance => Factor::Disturbance.as_str(),
-            Self::TrackingLoss => Factor::TrackingLoss.as_str(),
-            Self::Delay => Factor::Delay.as_str(),
+            Self::ModelMismatch => Perturbation::ModelMismatch.as_str(),
+            Self::ObservationNoise => Perturbation::ObservationNoise.as_str(),
+            Self::Disturbance => Perturbation::Disturbance.as_str(),
+            Self::TrackingLoss => Perturbation::TrackingLoss.as_str(),
+            Self::Delay => Perturbation::Delay.as_str(),
             Self::Evaluation => "evaluation",
         })
     }
 
-    /// The factors that are active in this profile.
+    /// The perturbations that are active in this profile.
     #[must_use]
-    pub const fn factors(self) -> Factors {
+    pub const fn active_perturbations(self) -> ActivePerturbations {
         match self {
-            Self::Ideal => Factors::NONE,
-            Self::ModelMismatch => Factors::only(Factor::ModelMismatch),
-            Self::ObservationNoise => Factors::only(Factor::ObservationNoise),
-            Self::Disturbance => Factors::only(Factor::Disturbance),
-            Self::TrackingLoss => Factors::only(Factor::TrackingLoss),
-            Self::Delay => Factors::only(Factor::Delay),
-            Self::Evaluation => Factors::EVALUATION,
+            Self::Ideal => ActivePerturbations::NONE,
+            Self::ModelMismatch => ActivePerturbations::only(Perturbation::ModelMismatch),
+            Self::ObservationNoise => ActivePerturbations::only(Perturbation::ObservationNoise),
+            Self::Disturbance => ActivePerturbations::only(Perturbation::Disturbance),
+            Self::TrackingLoss => ActivePerturbations::only(Perturbation::TrackingLoss),
+            Self::Delay => ActivePerturbations::only(Perturbation::Delay),
+            Self::Evaluation => ActivePerturbations::EVALUATION,
         }
     }
 }
@@ -175,17 +175,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn profiles_are_found_by_name_with_their_factors() {
+    fn profiles_are_found_by_name_with_their_perturbations() {
         for profile in AirHockeyProfile::ALL {
             assert_eq!(profile.name().try_into(), Ok(profile));
             let json = serde_json::to_string(&profile.name()).unwrap();
             assert_eq!(serde_json::to_string(&profile).unwrap(), json);
         }
         assert!("easy".parse::<AirHockeyProfile>().is_err());
-        for factor in Factor::EVALUATION {
-            assert!(AirHockeyProfile::Evaluation.factors().contains(factor));
-            let single: AirHockeyProfile = factor.as_str().parse().unwrap();
-            assert_eq!(single.factors(), Factors::only(factor));
+        for perturbation in Perturbation::EVALUATION {
+            assert!(
+                AirHockeyProfile::Evaluation
+                    .active_perturbations()
+                    .contains(perturbation)
+            );
+            let single: AirHockeyProfile = perturbation.as_str().parse().unwrap();
+            assert_eq!(
+                single.active_perturbations(),
+                ActivePerturbations::only(perturbation)
+            );
         }
     }
 }

@@ -1,11 +1,11 @@
-//! Magnitudes of the perturbation factors, such as noise (`docs/rules.md`, "Perturbations"). The *plant* is the robot in the
+//! Magnitudes of the perturbations, such as noise (`docs/rules.md`, "Perturbations"). The *plant* is the robot in the
 //! evaluator's simulator, and the *nominal model* is the one that teams have.
 
 use serde::{Deserialize, Serialize};
 
-/// Magnitudes of all factors; the defaults are the ruleset's. The profile decides which factors are active. Their valid ranges are those of
-/// the competition (`faceoff_airhockey::magnitudes`), which are checked before. The platform carries the same values by group and name, as
-/// `faceoff_types::Magnitudes`; requests and files call them `perturbations`.
+/// Magnitudes of all perturbations; the defaults are the ruleset's. The profile decides which of them are active. Their valid
+/// ranges are those of the competition (`faceoff_airhockey::magnitudes`), which are checked before. The platform carries the same values
+/// by group and name, as `faceoff_types::Magnitudes`; requests and files call them `perturbations`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PerturbationSettings {

@@ -5,7 +5,7 @@ use super::{
 };
 use crate::PerturbationSettings;
 use crate::{
-    Factor, Factors,
+    ActivePerturbations, Perturbation,
     stream::RandomStream,
     table::{geometry::PUCK, puck::Puck},
     world::World,
@@ -25,26 +25,32 @@ impl TablePerturbations {
     /// Draws from the seed of the episode or rally, and sets the puck's damping in the world. `settings` are the magnitudes.
     #[must_use]
     pub fn new(
-        factors: Factors,
+        active_perturbations: ActivePerturbations,
         settings: &PerturbationSettings,
         seed: &Seed,
         world: &mut World,
     ) -> Self {
-        let stream = |factor: Factor, label: &str| {
-            factors
-                .contains(factor)
+        let stream = |perturbation: Perturbation, label: &str| {
+            active_perturbations
+                .contains(perturbation)
                 .then(|| RandomStream::new(seed, label))
         };
-        let table = stream(Factor::Delay, "delay, table")
+        let table = stream(Perturbation::Delay, "delay, table")
             .map(|stream| RehearsalTable::draw(&settings.delay, stream));
         if let Some(table) = &table {
             world.set_puck_damping(table.puck_damping_per_s);
         }
         Self {
-            disturbance: stream(Factor::Disturbance, Factor::Disturbance.as_str())
-                .map(|stream| Disturbance::new(&settings.disturbance, stream)),
-            tracking_loss: stream(Factor::TrackingLoss, Factor::TrackingLoss.as_str())
-                .map(|stream| TrackingLoss::new(&settings.tracking_loss, stream)),
+            disturbance: stream(
+                Perturbation::Disturbance,
+                Perturbation::Disturbance.as_str(),
+            )
+            .map(|stream| Disturbance::new(&settings.disturbance, stream)),
+            tracking_loss: stream(
+                Perturbation::TrackingLoss,
+                Perturbation::TrackingLoss.as_str(),
+            )
+            .map(|stream| TrackingLoss::new(&settings.tracking_loss, stream)),
             tilt_n: table.map_or([0.0; 2], |table| table.tilt_m_s2.map(|a| PUCK.mass_kg * a)),
         }
     }

@@ -129,6 +129,7 @@ mod tests {
         let mut recorded = Vec::new();
         for step in 0..10 {
             let before = world.puck().pose[1];
+            // No air flow: no force on the puck.
             world.control_step(|_| [0.0; 2]);
             for impact in world.impacts().iter() {
                 recorded.push((step, *impact));

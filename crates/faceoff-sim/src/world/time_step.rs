@@ -119,6 +119,7 @@ fn advance_in_lanes<T: Lanes, A: FnMut(&Puck) -> [f64; 2]>(
         let (lane_world, arm) = world_in_lane(lane_worlds, lane);
         (&lane_world.world.arms[arm], &lane_world.world.plant)
     });
+    // For arms in contact or with a joint at its stop, which are solved one by one.
     let mut scalar = ScalarSolutions::empty();
     for _ in 0..substeps {
         for lane_world in lane_worlds.iter_mut() {

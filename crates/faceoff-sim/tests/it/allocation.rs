@@ -2,8 +2,8 @@
 
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
-    Command, Episode, Factors, Game, GameSetup, Interpolation, PerturbationSettings, Plant,
-    golden::scripted_action, model::INITIAL_Q,
+    ActivePerturbations, Command, Episode, Game, GameSetup, Interpolation, PerturbationSettings,
+    Plant, golden::scripted_action, model::INITIAL_Q,
 };
 use faceoff_types::Seed;
 
@@ -16,7 +16,7 @@ fn control_steps_allocate_nothing() {
         let mut episode = Episode::new(
             task,
             Interpolation::Cubic,
-            Factors::EVALUATION,
+            ActivePerturbations::EVALUATION,
             &settings,
             &plant,
             seed.episode(task, 0),
@@ -44,7 +44,7 @@ fn control_steps_allocate_nothing() {
 fn game_allocates_only_at_the_start_of_a_rally() {
     let mut game = Game::new(GameSetup {
         interpolation: [Interpolation::Cubic; 2],
-        factors: Factors::EVALUATION,
+        active_perturbations: ActivePerturbations::EVALUATION,
         settings: PerturbationSettings::default(),
         plant: Plant::nominal(),
         seed: Seed::from_number(1),

@@ -2,7 +2,7 @@
 
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
-    Batch, BatchSetup, Episode, Factors, Interpolation, PerturbationSettings, Plant,
+    ActivePerturbations, Batch, BatchSetup, Episode, Interpolation, PerturbationSettings, Plant,
     golden::scripted_action,
 };
 use faceoff_types::Seed;
@@ -19,7 +19,7 @@ fn setup(task: AirHockeyTask) -> BatchSetup {
     BatchSetup {
         task,
         interpolation: Interpolation::Cubic,
-        factors: Factors::EVALUATION,
+        active_perturbations: ActivePerturbations::EVALUATION,
         plant: Plant::mismatched(&settings, seed.model_mismatch()),
         settings,
         seed,
@@ -58,7 +58,7 @@ fn worlds_run_the_episodes_of_the_evaluation_in_order() {
             Episode::new(
                 task,
                 setup.interpolation,
-                setup.factors,
+                setup.active_perturbations,
                 &setup.settings,
                 &setup.plant,
                 setup.seed.episode(task, number),

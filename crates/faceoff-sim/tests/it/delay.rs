@@ -1,10 +1,13 @@
 //! The perturbation `delay`, which is for rehearsals on a real robot: the agent sees the puck late, its actions are applied late, and the
 //! table is tilted and damps the puck differently (`docs/rules.md`, "Perturbations").
 
-use crate::held_arm::{episode, hold};
+use crate::{
+    held_arm::{episode, hold},
+    still_air::step_in_still_air,
+};
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
-    Episode, Factor, Factors, Interpolation, PerturbationSettings, Plant, World,
+    ActivePerturbations, Episode, Interpolation, Perturbation, PerturbationSettings, Plant, World,
     perturbation::rehearsal_table::RehearsalTable, stream::RandomStream,
 };
 use faceoff_types::Seed;
@@ -17,7 +20,11 @@ fn puck_is_observed_one_or_two_control_steps_late() {
     // Number of observations with a delay of 0, 1 and 2 control steps.
     let (mut lag_counts, mut total) = ([0; 3], 0);
     for seed in 0..40 {
-        let mut episode = episode(AirHockeyTask::Hit, Factors::only(Factor::Delay), seed);
+        let mut episode = episode(
+            AirHockeyTask::Hit,
+            ActivePerturbations::only(Perturbation::Delay),
+            seed,
+        );
         let mut pucks = vec![episode.state().puck];
         for _ in 0..60 {
             let end = episode.step(&hold()).end;
@@ -46,7 +53,11 @@ fn puck_is_observed_one_or_two_control_steps_late() {
 
 #[test]
 fn joints_are_observed_without_delay() {
-    let mut episode = episode(AirHockeyTask::Defend, Factors::only(Factor::Delay), 1);
+    let mut episode = episode(
+        AirHockeyTask::Defend,
+        ActivePerturbations::only(Perturbation::Delay),
+        1,
+    );
     let mut moving = hold();
     moving[0] = 0.02;
     for _ in 0..5 {
@@ -57,8 +68,12 @@ fn joints_are_observed_without_delay() {
 
 #[test]
 fn actions_are_applied_one_control_step_late() {
-    let mut delayed = episode(AirHockeyTask::Defend, Factors::only(Factor::Delay), 2);
-    let mut prompt = episode(AirHockeyTask::Defend, Factors::NONE, 2);
+    let mut delayed = episode(
+        AirHockeyTask::Defend,
+        ActivePerturbations::only(Perturbation::Delay),
+        2,
+    );
+    let mut prompt = episode(AirHockeyTask::Defend, ActivePerturbations::NONE, 2);
     let mut moving = hold();
     (moving[0], moving[7]) = (0.01, 0.3);
     prompt.step(&hold());
@@ -82,14 +97,14 @@ fn arm_coasts_80_ms_after_a_late_action_and_stops() {
         action[0] = 0.01 * f64::from(step); // position of the first joint, rad
         action[7] = 0.5; // its velocity, rad/s
         world.command(0, Interpolation::Cubic, &action);
-        world.control_step(|_| [0.0; 2]);
+        step_in_still_air(&mut world);
     }
     // Movement of the first joint in each control step, rad.
     let mut movements = vec![];
     for _ in 0..20 {
         let before = world.joints(0)[0];
         world.coast(0);
-        world.control_step(|_| [0.0; 2]);
+        step_in_still_air(&mut world);
         movements.push(world.joints(0)[0] - before);
     }
     // At 0.5 rad/s, 10 mrad per control step; the arm follows with a small lag.
@@ -107,11 +122,11 @@ fn arm_coasts_80_ms_after_a_late_action_and_stops() {
     // A new action ends the coasting; after the next late action the arm coasts again.
     action[0] = world.joints(0)[0] + 0.01;
     world.command(0, Interpolation::Cubic, &action);
-    world.control_step(|_| [0.0; 2]);
+    step_in_still_air(&mut world);
     let before = world.joints(0)[0];
     for _ in 0..2 {
         world.coast(0);
-        world.control_step(|_| [0.0; 2]);
+        step_in_still_air(&mut world);
     }
     assert!(world.joints(0)[0] - before > 0.01);
 }
@@ -156,7 +171,7 @@ fn tilt_and_air_cushion_act_on_the_puck() {
     let mut episode = Episode::with_initial_puck(
         AirHockeyTask::Hit,
         Interpolation::Cubic,
-        Factors::only(Factor::Delay),
+        ActivePerturbations::only(Perturbation::Delay),
         &settings,
         &Plant::nominal(),
         seed,
@@ -178,15 +193,15 @@ fn tilt_and_air_cushion_act_on_the_puck() {
 }
 
 #[test]
-fn delay_does_not_change_draws_of_other_factors() {
+fn delay_does_not_change_draws_of_other_perturbations() {
     let alone = episode(
         AirHockeyTask::Defend,
-        Factors::only(Factor::ObservationNoise),
+        ActivePerturbations::only(Perturbation::ObservationNoise),
         3,
     );
     let both = episode(
         AirHockeyTask::Defend,
-        Factors::only(Factor::ObservationNoise).with(Factor::Delay),
+        ActivePerturbations::only(Perturbation::ObservationNoise).with(Perturbation::Delay),
         3,
     );
     assert_eq!(alone.observation(), both.observation());

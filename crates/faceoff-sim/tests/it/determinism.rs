@@ -1,6 +1,7 @@
 //! The same seed gives the same bits on every thread and in a clone, and a robot moves the same with or without a second one. `golden.rs`
 //! compares builds.
 
+use crate::still_air::step_in_still_air;
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
     AirHockeyProfile, Interpolation, Plant, World,
@@ -47,8 +48,8 @@ fn arm_moves_the_same_alone_and_with_a_second_arm() {
         for robot in 0..2 {
             together.command(robot, Interpolation::Cubic, &action);
         }
-        alone.control_step(|_| [0.0; 2]);
-        together.control_step(|_| [0.0; 2]);
+        step_in_still_air(&mut alone);
+        step_in_still_air(&mut together);
         for robot in 0..2 {
             assert_eq!(alone.joints(0), together.joints(robot));
             assert_eq!(alone.joint_velocities(0), together.joint_velocities(robot));

@@ -1,12 +1,12 @@
 //! Episodes that are stepped at once, with SIMD instructions, have the same bits as those that are stepped alone, with every instruction
-//! set. `Factors` are the perturbations of an episode, such as noise. The *universal joint* is the two hinges on which the mallet hangs.
+//! set. `ActivePerturbations` are those of an episode, such as noise. The *universal joint* is the two hinges on which the mallet hangs.
 
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::episode::ends::CROSSED_MIDDLE;
 use faceoff_sim::{
-    Bounds, Episode, Factor, Factors, Interpolation, JOINTS, PerturbationSettings, Plant,
-    SimdLevel, StepOutcome, golden::scripted_action, model::INITIAL_Q, step_episodes,
-    step_episodes_on,
+    ActivePerturbations, Bounds, Episode, Interpolation, JOINTS, Perturbation,
+    PerturbationSettings, Plant, SimdLevel, StepOutcome, golden::scripted_action, model::INITIAL_Q,
+    step_episodes, step_episodes_on,
 };
 use faceoff_types::{ACTION_LIMIT, EpisodeEnd, Seed};
 
@@ -48,10 +48,16 @@ struct EpisodeWithAgent {
 
 impl EpisodeWithAgent {
     /// `number` is both the seed and the index of the episode.
-    fn new(task: AirHockeyTask, number: u32, factors: Factors, habit: Habit) -> Self {
+    fn new(
+        task: AirHockeyTask,
+        number: u32,
+        active_perturbations: ActivePerturbations,
+        habit: Habit,
+    ) -> Self {
         let settings = PerturbationSettings::default();
         let seed = Seed::from_number(u64::from(number));
-        let plant = Plant::for_factors(factors, &settings, seed.model_mismatch());
+        let plant =
+            Plant::for_perturbations(active_perturbations, &settings, seed.model_mismatch());
         let interpolation = match habit {
             Habit::Strikes => Interpolation::Cubic,
             Habit::Holds => Interpolation::Quintic,
@@ -59,7 +65,14 @@ impl EpisodeWithAgent {
             Habit::DivergesFrom(_) => Interpolation::Trajectory,
         };
         let seed = seed.episode(task, number);
-        let episode = Episode::new(task, interpolation, factors, &settings, &plant, seed);
+        let episode = Episode::new(
+            task,
+            interpolation,
+            active_perturbations,
+            &settings,
+            &plant,
+            seed,
+        );
         Self {
             episode: episode.with_bounds(NARROW),
             habit,
@@ -163,19 +176,23 @@ fn compare_with_alone(simd_level: SimdLevel, plays: Vec<EpisodeWithAgent>) -> Ve
 
 #[test]
 fn episodes_with_contacts_are_the_same_at_once() {
-    let singles = Factor::EVALUATION.map(|factor| Factors::NONE.with(factor));
+    let singles =
+        Perturbation::EVALUATION.map(|perturbation| ActivePerturbations::NONE.with(perturbation));
     for simd_level in simd_levels() {
-        for factors in [Factors::NONE, Factors::EVALUATION]
+        for active_perturbations in [ActivePerturbations::NONE, ActivePerturbations::EVALUATION]
             .into_iter()
             .chain(singles)
         {
             // 13 episodes fill some groups of lanes, and the last ones partly.
             let plays = (0..13).map(|number| {
                 let task = AirHockeyTask::ALL[number as usize % 3];
-                EpisodeWithAgent::new(task, number, factors, Habit::Strikes)
+                EpisodeWithAgent::new(task, number, active_perturbations, Habit::Strikes)
             });
             let ends = compare_with_alone(simd_level, plays.collect());
-            assert!(ends.contains(&CROSSED_MIDDLE), "{factors:?}: {ends:?}");
+            assert!(
+                ends.contains(&CROSSED_MIDDLE),
+                "{active_perturbations:?}: {ends:?}"
+            );
         }
     }
 }
@@ -193,7 +210,7 @@ fn diverging_world_does_not_change_the_others() {
         let plays = (0..15).map(|number| {
             let habit = habits[number as usize % habits.len()];
             let task = AirHockeyTask::ALL[number as usize / habits.len()];
-            EpisodeWithAgent::new(task, number, Factors::EVALUATION, habit)
+            EpisodeWithAgent::new(task, number, ActivePerturbations::EVALUATION, habit)
         });
         let ends = compare_with_alone(simd_level, plays.collect());
         assert!(ends.contains(&EpisodeEnd::AGENT_FAULT), "{ends:?}");
@@ -207,8 +224,13 @@ fn step_accepts_any_number_of_worlds() {
         let held = Interpolation::Quintic.hold_position(&INITIAL_Q);
         let action = &held[..Interpolation::Quintic.len()];
         let holding = |number| {
-            EpisodeWithAgent::new(AirHockeyTask::Prepare, number, Factors::NONE, Habit::Holds)
-                .episode
+            EpisodeWithAgent::new(
+                AirHockeyTask::Prepare,
+                number,
+                ActivePerturbations::NONE,
+                Habit::Holds,
+            )
+            .episode
         };
         let mut episodes: Vec<Episode> = (0..count).map(holding).collect();
         let mut outcomes = vec![holding(0).step(action); count as usize];
@@ -221,7 +243,12 @@ fn step_accepts_any_number_of_worlds() {
 #[test]
 #[should_panic(expected = "expected an action for each episode")]
 fn missing_action_panics() {
-    let mut episode =
-        EpisodeWithAgent::new(AirHockeyTask::Defend, 0, Factors::NONE, Habit::Holds).episode;
+    let mut episode = EpisodeWithAgent::new(
+        AirHockeyTask::Defend,
+        0,
+        ActivePerturbations::NONE,
+        Habit::Holds,
+    )
+    .episode;
     step_episodes(&mut [&mut episode], &[], &mut []);
 }

@@ -1,11 +1,14 @@
 //! Games between two agents: goals, fouls and stuck pucks match the recording `game_rules` of the *reference* (the simulator of the
-//! 2023 Robot Air Hockey Challenge), and the rules of `docs/rules.md` ("Tournament") hold. A *rally* lasts from a serve to a goal, a foul or another end.
-//! Robots are 0 and 1.
+//! 2023 Robot Air Hockey Challenge), and the rules of `docs/rules.md` ("Tournament") hold. A *rally* lasts from a serve to a goal, a foul
+//! or another end. Robots are 0 and 1.
 
-use crate::reference::{array, cases, max_difference};
+use crate::{
+    reference::{array, cases, max_difference},
+    still_air::step_in_still_air,
+};
 use faceoff_sim::{
-    Command, Factors, Game, GameSetup, Interpolation, PerturbationSettings, Plant, RallyEnd,
-    ViolatedConstraints, World,
+    ActivePerturbations, Command, Game, GameSetup, Interpolation, PerturbationSettings, Plant,
+    RallyEnd, ViolatedConstraints, World,
     game::referee::Referee,
     golden::game_hash,
     model::{EE_DESIRED_HEIGHT_M, INITIAL_Q},
@@ -18,13 +21,13 @@ const FOUL_STEPS: u32 = 752;
 
 const CONTROL_STEP_S: f64 = 0.02;
 
-fn setup(factors: Factors, seed: u64) -> GameSetup {
+fn setup(active_perturbations: ActivePerturbations, seed: u64) -> GameSetup {
     let settings = PerturbationSettings::default();
     let seed = Seed::from_number(seed);
     GameSetup {
         interpolation: [Interpolation::Cubic; 2],
-        factors,
-        plant: Plant::for_factors(factors, &settings, seed.model_mismatch()),
+        active_perturbations,
+        plant: Plant::for_perturbations(active_perturbations, &settings, seed.model_mismatch()),
         settings,
         seed,
     }
@@ -63,7 +66,7 @@ fn goals_fouls_and_stuck_pucks_match_the_recording() {
         }
         let plant = Plant::nominal();
         let mut world = World::with_robots(&plant, 2, array(&case["puck_before"]));
-        world.control_step(|_| [0.0; 2]);
+        step_in_still_air(&mut world);
         let after: [f64; 6] = array(&case["puck_after"]);
         assert!(
             max_difference(&world.puck().state(), &after) <= 1e-6,
@@ -97,7 +100,7 @@ fn goals_fouls_and_stuck_pucks_match_the_recording() {
 
 #[test]
 fn robots_that_hold_still_foul_in_turn_every_15_s() {
-    let mut game = Game::new(setup(Factors::NONE, 3));
+    let mut game = Game::new(setup(ActivePerturbations::NONE, 3));
     let hold = hold();
     let first_robot = game.referee().serving_robot;
     let mut fouls = vec![];
@@ -124,7 +127,7 @@ fn rally_starts_at_rest_on_the_serving_side() {
     let hold = hold();
     let mut starts = vec![];
     for seed in 0..40 {
-        let mut game = Game::new(setup(Factors::NONE, seed));
+        let mut game = Game::new(setup(ActivePerturbations::NONE, seed));
         for _ in 0..FOUL_STEPS {
             starts.push((
                 game.referee().serving_robot,
@@ -151,7 +154,7 @@ fn rally_starts_at_rest_on_the_serving_side() {
 
 #[test]
 fn cloned_game_continues_with_the_same_bits() {
-    let mut game = Game::new(setup(Factors::EVALUATION, 2));
+    let mut game = Game::new(setup(ActivePerturbations::EVALUATION, 2));
     game_hash(&mut game, 700);
     assert_eq!(game_hash(&mut game.clone(), 900), game_hash(&mut game, 900));
 }
@@ -173,7 +176,7 @@ fn observations_are_symmetric_for_both_robots() {
             });
             world.command(k, Interpolation::Cubic, &actions[0]);
             world.command(1 - k, Interpolation::Cubic, &actions[1]);
-            world.control_step(|_| [0.0; 2]);
+            step_in_still_air(world);
         }
         let observations = [(0, 0), (1, 1)].map(|(world, robot)| {
             faceoff_sim::channel::observation::observe(&worlds[world], robot)
@@ -188,7 +191,7 @@ fn observations_are_symmetric_for_both_robots() {
 /// A window is 500 steps of a game. Penalty points are counted per window, as they are per episode of a task.
 #[test]
 fn window_counts_a_violation_once() {
-    let mut game = Game::new(setup(Factors::NONE, 5));
+    let mut game = Game::new(setup(ActivePerturbations::NONE, 5));
     // Robot 2 lifts its mallet and keeps it lifted; robot 1 holds still.
     let hold = hold();
     let mut lift = hold;
@@ -215,7 +218,7 @@ fn window_counts_a_violation_once() {
 
 #[test]
 fn late_answer_commands_the_previous_position_at_rest() {
-    let mut late = Game::new(setup(Factors::NONE, 6));
+    let mut late = Game::new(setup(ActivePerturbations::NONE, 6));
     let mut held = late.clone();
     let hold = hold();
     let mut moving = hold;
@@ -250,7 +253,7 @@ fn mallets_do_not_pass_through_each_other() {
             let action = Interpolation::Cubic.hold_position(&q);
             world.command(robot, Interpolation::Cubic, &action[..14]);
         }
-        world.control_step(|_| [0.0; 2]);
+        step_in_still_air(&mut world);
         let [a, b] = [0, 1].map(|robot| world.mallet(robot).position);
         least_distance_m = least_distance_m.min((a[0] - b[0]).hypot(a[1] - b[1]));
     }
@@ -263,7 +266,7 @@ fn mallets_do_not_pass_through_each_other() {
 
 #[test]
 fn restarted_agent_may_change_its_interpolation() {
-    let mut game = Game::new(setup(Factors::NONE, 3));
+    let mut game = Game::new(setup(ActivePerturbations::NONE, 3));
     let hold = hold();
     while game.rally() == 0 {
         game.step([Command::Act(&hold); 2]);
@@ -288,11 +291,11 @@ fn restarted_agent_may_change_its_interpolation() {
 #[test]
 fn game_continued_from_its_progress_has_the_same_bits() {
     let hold = hold();
-    let mut game = Game::new(setup(Factors::EVALUATION, 5));
+    let mut game = Game::new(setup(ActivePerturbations::EVALUATION, 5));
     while game.rally() < 2 {
         game.step([Command::Act(&hold); 2]);
     }
-    let mut later = Game::at_rally(setup(Factors::EVALUATION, 5), &game.progress());
+    let mut later = Game::at_rally(setup(ActivePerturbations::EVALUATION, 5), &game.progress());
     assert_eq!(later.progress(), game.progress());
     while game.rally() < 4 {
         assert_eq!(later.observation(1), game.observation(1));

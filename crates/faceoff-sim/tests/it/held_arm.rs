@@ -1,15 +1,21 @@
 //! Episodes in which the arm holds its initial position.
 
 use faceoff_sim::AirHockeyTask;
-use faceoff_sim::{Episode, Factors, Interpolation, PerturbationSettings, Plant, model::INITIAL_Q};
+use faceoff_sim::{
+    ActivePerturbations, Episode, Interpolation, PerturbationSettings, Plant, model::INITIAL_Q,
+};
 use faceoff_types::Seed;
 
 /// An episode of the nominal plant, with the rules' perturbation settings.
-pub fn episode(task: AirHockeyTask, factors: Factors, seed: u64) -> Episode {
+pub fn episode(
+    task: AirHockeyTask,
+    active_perturbations: ActivePerturbations,
+    seed: u64,
+) -> Episode {
     Episode::new(
         task,
         Interpolation::Cubic,
-        factors,
+        active_perturbations,
         &PerturbationSettings::default(),
         &Plant::nominal(),
         Seed::from_number(seed),

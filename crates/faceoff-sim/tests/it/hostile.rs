@@ -3,7 +3,7 @@
 
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
-    Bounds, Command, Episode, Factors, Game, GameSetup, Interpolation, JOINTS,
+    ActivePerturbations, Bounds, Command, Episode, Game, GameSetup, Interpolation, JOINTS,
     PerturbationSettings, Plant, RallyEnd, model::INITIAL_Q, stream::RandomStream,
 };
 use faceoff_types::{ACTION_LIMIT, EpisodeEnd, Seed};
@@ -105,7 +105,7 @@ fn play_and_check(
     let mut episode = Episode::new(
         task,
         interpolation,
-        Factors::EVALUATION,
+        ActivePerturbations::EVALUATION,
         &settings,
         plant,
         seed.episode(task, 0),
@@ -156,7 +156,7 @@ const NARROW: Bounds = Bounds {
 fn episodes_stay_finite_for_hostile_commands() {
     let settings = PerturbationSettings::default();
     let mismatch_seed = Seed::from_number(11).model_mismatch();
-    let plant = Plant::for_factors(Factors::EVALUATION, &settings, mismatch_seed);
+    let plant = Plant::for_perturbations(ActivePerturbations::EVALUATION, &settings, mismatch_seed);
     let count = |bounds: Bounds| {
         let (mut diverged, mut played) = (0, 0);
         for task in AirHockeyTask::ALL {
@@ -186,14 +186,18 @@ fn episodes_stay_finite_for_hostile_commands() {
 fn divergence_in_a_game_names_the_hostile_robot() {
     let settings = PerturbationSettings::default();
     let seed = Seed::from_number(12);
-    let plant = Plant::for_factors(Factors::EVALUATION, &settings, seed.model_mismatch());
+    let plant = Plant::for_perturbations(
+        ActivePerturbations::EVALUATION,
+        &settings,
+        seed.model_mismatch(),
+    );
     let mut diverged_rallies = 0;
     for interpolation in interpolations() {
         for habit in HABITS {
             for hostile in 0..2 {
                 let mut game = Game::new(GameSetup {
                     interpolation: [interpolation; 2],
-                    factors: Factors::EVALUATION,
+                    active_perturbations: ActivePerturbations::EVALUATION,
                     plant: plant.clone(),
                     settings: settings.clone(),
                     seed,
@@ -242,7 +246,7 @@ fn diverged_world_stops() {
     let mut episode = Episode::new(
         AirHockeyTask::Prepare,
         interpolation,
-        Factors::NONE,
+        ActivePerturbations::NONE,
         &settings,
         &Plant::nominal(),
         seed,
@@ -286,7 +290,7 @@ fn non_finite_commands_leave_a_finite_state() {
             let mut episode = Episode::new(
                 AirHockeyTask::Hit,
                 interpolation,
-                Factors::NONE,
+                ActivePerturbations::NONE,
                 &settings,
                 &Plant::nominal(),
                 Seed::from_number(14),

@@ -29,4 +29,5 @@ mod puck;
 mod reference;
 mod replay;
 mod robot_document;
+mod still_air;
 mod success_rates;

@@ -1,10 +1,10 @@
-//! The perturbations have the statistics of the rules (`docs/rules.md`, "Perturbations"), and they are independent: no *factor* (kind of
-//! perturbation) changes the random numbers of another.
+//! The perturbations have the statistics of the rules (`docs/rules.md`, "Perturbations"), and they are independent: none changes the
+//! random numbers of another.
 
 use crate::held_arm::{episode, hold};
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
-    Factor, Factors, PerturbationSettings, Plant,
+    ActivePerturbations, Perturbation, PerturbationSettings, Plant,
     perturbation::{
         disturbance::Disturbance, noise::ObservationNoise, tracking_loss::TrackingLoss,
     },
@@ -128,10 +128,11 @@ fn tracking_loss_has_the_rate_and_length_of_the_rules() {
 
 #[test]
 fn lost_puck_is_reported_frozen_and_at_rest() {
-    let factors = Factors::only(Factor::TrackingLoss).with(Factor::ObservationNoise);
+    let active_perturbations =
+        ActivePerturbations::only(Perturbation::TrackingLoss).with(Perturbation::ObservationNoise);
     let mut frozen = 0;
     for seed in 0..8 {
-        let mut episode = episode(AirHockeyTask::Prepare, factors, seed);
+        let mut episode = episode(AirHockeyTask::Prepare, active_perturbations, seed);
         let mut last = episode.observation()[..3].to_vec();
         assert_ne!(episode.observation()[3], 0.0, "tracked at first");
         for _ in 0..60 {
@@ -150,16 +151,16 @@ fn lost_puck_is_reported_frozen_and_at_rest() {
 }
 
 #[test]
-fn factor_does_not_change_draws_of_other_factors() {
+fn perturbation_does_not_change_draws_of_others() {
     // Noise and tracking loss do not act on the world, so that noise can be compared while the puck is tracked.
-    let noise = Factors::only(Factor::ObservationNoise);
-    let both = noise.with(Factor::TrackingLoss);
-    let mut ideal = episode(AirHockeyTask::Prepare, Factors::NONE, 5);
+    let noise = ActivePerturbations::only(Perturbation::ObservationNoise);
+    let both = noise.with(Perturbation::TrackingLoss);
+    let mut ideal = episode(AirHockeyTask::Prepare, ActivePerturbations::NONE, 5);
     let mut alone = episode(AirHockeyTask::Prepare, noise, 5);
     let mut together = episode(AirHockeyTask::Prepare, both, 5);
     let mut loss = episode(
         AirHockeyTask::Prepare,
-        Factors::only(Factor::TrackingLoss),
+        ActivePerturbations::only(Perturbation::TrackingLoss),
         5,
     );
     for _ in 0..200 {
@@ -174,19 +175,19 @@ fn factor_does_not_change_draws_of_other_factors() {
             assert_eq!(alone.observation(), together.observation());
         }
     }
-    // The air flow's draws do not depend on the other factors: the worlds agree bit for bit.
-    let air = Factors::only(Factor::Disturbance);
+    // The air flow's draws do not depend on the other perturbations: the worlds agree bit for bit.
+    let air = ActivePerturbations::only(Perturbation::Disturbance);
     let mut alone = episode(AirHockeyTask::Defend, air, 5);
-    let mut together = episode(AirHockeyTask::Defend, Factors::EVALUATION, 5);
+    let mut together = episode(AirHockeyTask::Defend, ActivePerturbations::EVALUATION, 5);
     for _ in 0..30 {
         alone.step(&hold());
         together.step(&hold());
         assert_eq!(alone.state(), together.state());
     }
-    // The initial state depends on no factor.
+    // The initial state depends on no perturbation.
     assert_eq!(
-        episode(AirHockeyTask::Hit, Factors::NONE, 9).state(),
-        episode(AirHockeyTask::Hit, Factors::EVALUATION, 9).state()
+        episode(AirHockeyTask::Hit, ActivePerturbations::NONE, 9).state(),
+        episode(AirHockeyTask::Hit, ActivePerturbations::EVALUATION, 9).state()
     );
 }
 
@@ -207,7 +208,9 @@ fn mismatched_plants_sag_by_five_to_ten_millimetres() {
 
 #[test]
 fn initial_states_fill_the_ranges_of_the_rules() {
-    let states = |task| (0..2_000).map(move |seed| episode(task, Factors::NONE, seed).state().puck);
+    let states = |task| {
+        (0..2_000).map(move |seed| episode(task, ActivePerturbations::NONE, seed).state().puck)
+    };
     let range = |values: Vec<f64>| {
         let low = values.iter().copied().fold(f64::INFINITY, f64::min);
         (

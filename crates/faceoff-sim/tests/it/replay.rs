@@ -5,7 +5,8 @@
 use crate::reference::{array, cases, flat, max_difference, recording, rows};
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
-    Episode, Factors, Interpolation, MalletState, PerturbationSettings, Plant, SUBSTEPS, World,
+    ActivePerturbations, Episode, Interpolation, MalletState, PerturbationSettings, Plant,
+    SUBSTEPS, World,
 };
 use faceoff_types::Seed;
 
@@ -211,7 +212,7 @@ fn replay_episode(task: AirHockeyTask, index: usize, case: &serde_json::Value) -
     let mut episode = Episode::with_initial_puck(
         task,
         Interpolation::Cubic,
-        Factors::NONE,
+        ActivePerturbations::NONE,
         &PerturbationSettings::default(),
         &Plant::nominal(),
         Seed::from_number(0),

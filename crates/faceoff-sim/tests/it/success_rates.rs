@@ -2,7 +2,7 @@
 
 use faceoff_sim::AirHockeyTask;
 use faceoff_sim::{
-    Episode, Factors, Interpolation, PerturbationSettings, Plant, ViolatedConstraints,
+    ActivePerturbations, Episode, Interpolation, PerturbationSettings, Plant, ViolatedConstraints,
     model::INITIAL_Q,
 };
 use faceoff_types::Seed;
@@ -15,7 +15,7 @@ fn play_holding(task: AirHockeyTask, episodes: u32) -> (u32, u32) {
         let mut episode = Episode::new(
             task,
             Interpolation::Cubic,
-            Factors::NONE,
+            ActivePerturbations::NONE,
             &PerturbationSettings::default(),
             &Plant::nominal(),
             Seed::from_number(11).episode(task, index), // arbitrary seed

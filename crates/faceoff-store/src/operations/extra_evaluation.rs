@@ -6,7 +6,7 @@ use crate::{
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
-        new_evaluation::{DaySetup, NewEvaluation, queue_evaluation},
+        new_evaluation::{DaySetup, NO_DELAY_S, NewEvaluation, queue_evaluation},
         organiser_decisions::void,
         start_day::check_open,
     },
@@ -105,7 +105,7 @@ impl Store {
                 team,
                 rerun_of: None,
             };
-            queue_evaluation(tx, new, &setup, 0).await?;
+            queue_evaluation(tx, new, &setup, NO_DELAY_S).await?;
             evaluation_specs::set_extra(tx, id, reason).await?;
             let reason = reason.to_owned();
             tx.record(Subject::Evaluation(id), Event::ExtraEvaluationAdded { reason });

@@ -34,6 +34,9 @@ pub(crate) struct DaySetup {
     pub(crate) plan: RunPlan,
 }
 
+/// The delay of shards that may run at once, in seconds.
+pub(crate) const NO_DELAY_S: u32 = 0;
+
 /// Adds an evaluation of a day and queues its shards, to be run after `delay_s` seconds at the earliest.
 /// [`Conflict`](crate::StoreError::Conflict) if the team already has a counting one of that day.
 pub(crate) async fn queue_evaluation(

@@ -5,7 +5,7 @@ use crate::{
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
-        new_evaluation::{DaySetup, NewEvaluation, queue_evaluation},
+        new_evaluation::{DaySetup, NO_DELAY_S, NewEvaluation, queue_evaluation},
         release_day,
     },
     queries,
@@ -124,7 +124,7 @@ pub(crate) async fn start(
             team: submission.team,
             rerun_of: None,
         };
-        let id = queue_evaluation(tx, new, &setup, 0).await?;
+        let id = queue_evaluation(tx, new, &setup, NO_DELAY_S).await?;
         started.push(queries::evaluations::find(tx, id).await?);
     }
     let evaluations = u32::try_from(started.len()).unwrap_or(u32::MAX);

@@ -75,7 +75,8 @@ struct OpenJob {
     /// Number of its account.
     account: i64,
     /// Jobs of a smaller batch come first within a lane; within a batch and account, those with a smaller `queue_no`. The batch is the
-    /// time of the cutoff or request in milliseconds, the matchday or replay number of a game, or 0.
+    /// time of the cutoff or request in milliseconds, the matchday of a round's game, the number of a repetition of the tournament's
+    /// schedule, or 0.
     batch: i64,
     /// Rises with every queued job.
     queue_no: i64,

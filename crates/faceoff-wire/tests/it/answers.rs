@@ -310,6 +310,7 @@ fn invalid_json_is_refused_with_a_reason() {
     assert_not_json("loss: NaN", "at character 1");
     let long = format!("\"{}\"", "é".repeat(20_000));
     assert_not_json(&long, "… at character 40002");
+    // The text itself contains " at ", by which the position at the end of the parser's message is found.
     let with_at_near_end = format!("\"{} at {}\"", "é".repeat(300), "é".repeat(300));
     for line in [long.clone(), format!("\n{long}"), with_at_near_end] {
         let Err(AgentFaultKind::NotJson { detail }) = parse(&line) else {

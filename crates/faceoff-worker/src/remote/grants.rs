@@ -48,6 +48,7 @@ pub(super) fn grant_for(job: &JobSpec, program_blake3: &str) -> Grant {
             };
             (bundles.into(), write_scope, expected_recording)
         }
+        // These jobs run on the server's own slots only (`docs/workers.md`).
         JobPayload::Validation { .. } | JobPayload::Scoring { .. } => {
             (Vec::new(), WriteScope::None, ExpectedRecording::None)
         }

@@ -254,7 +254,8 @@ impl RequestHandler {
         if !renewals.is_due(lease.nonce, episodes_done, interval, Instant::now()) {
             return Ok(true);
         }
-        // A lease that does not name a slot of this worker is renewed in the name of the worker.
+        // The lease's holder, which the worker wrote, becomes the actor of the write. If it is none of the worker's slots, the actor is
+        // the worker itself.
         let is_own_slot = lease.holder.starts_with(&worker.slot_holder(""));
         let claim = to_claim(
             lease,

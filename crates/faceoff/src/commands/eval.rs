@@ -42,10 +42,10 @@ pub struct EvalCommand {
     /// Episodes per task
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_EPISODES_PER_TASK)))]
     episodes: u32,
-    /// Perturbations: ideal, one factor's name, or evaluation [default: evaluation, or the stage's with --like-server]
+    /// Perturbations: ideal, the name of one, or evaluation [default: evaluation, or the stage's with --like-server]
     #[arg(long, value_parser = parse_profile)]
     profile: Option<Profile>,
-    /// Run the same episodes in six profiles (ideal, each of the four factors of evaluation alone, and evaluation) and
+    /// Run the same episodes in six profiles (ideal, each of the four perturbations of evaluation alone, and evaluation) and
     /// compare them; writes ablation.json and a folder for each profile
     #[arg(long, conflicts_with = "profile")]
     ablation: bool,

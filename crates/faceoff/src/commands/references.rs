@@ -227,7 +227,7 @@ mod tests {
         let find =
             |part: &str| find_part(&ids, part, "evaluation").map_err(|error| error.to_string());
         assert_eq!(find("0002"), Ok(ids[1]));
-        assert_eq!(find(&ids[2].to_string()[..36]), Ok(ids[2]));
+        assert_eq!(find("8000-000000000003"), Ok(ids[2]));
         assert!(
             find("0190")
                 .unwrap_err()

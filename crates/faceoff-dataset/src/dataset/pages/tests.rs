@@ -136,11 +136,12 @@ fn cut_headers_are_incomplete_or_invalid() {
     }
     for (bytes, error) in [
         (&[0][..], HeaderError::Invalid),
-        // A second size, by another number or type.
+        // The uncompressed size twice; the second time, its field number is written out.
         (
             &[0x25, 0x02, 0x15, 0x02, 0x05, 0x04, 0x7e, 0x00],
             HeaderError::Invalid,
         ),
+        // One uncompressed size, but of type i64 instead of i32.
         (&[0x26, 0x02, 0x15, 0x02, 0x00], HeaderError::Invalid),
         // A list, which the format has not here.
         (

@@ -3,6 +3,9 @@
 `python -m faceoff.challenge_2023 MY_FOLDER BUNDLE` makes a bundle from a team's folder (docs/from-2023.md). The bundle
 contains a substitute of `air_hockey_challenge` with the parts that play: `AgentBase`, kinematics, transformations and
 constraints. Everything here needs only NumPy. It does not simulate: the simulator is in `faceoff.gym`.
+
+The substitute replaces a package. A stand-in replaces an object of MuJoCo in `env_info`, such as `robot_model`; using an
+attribute that it does not have raises `StandInError`.
 """
 
 from faceoff.challenge_2023._adapter import Adapter, adapt, play

@@ -12,7 +12,7 @@ from faceoff.kinematics import model
 
 
 class StandInError(Error, AttributeError):
-    """An attribute of a MuJoCo object that its stand-in does not have."""
+    """An attribute of a MuJoCo object in ``env_info`` that its stand-in does not have."""
 
 
 class _StandIn:

@@ -14,12 +14,12 @@ from faceoff import _native
 from faceoff._arguments import (
     ACTION_MODES,
     ActionMode,
-    factor_names,
     flag,
     integer,
     interpolation_code,
     mismatch_seed_text,
     one_of,
+    perturbation_names,
     perturbations_json,
 )
 from faceoff.errors import ArgumentError, ArgumentTypeError, ClosedError
@@ -83,7 +83,7 @@ class GameArguments:
             "interpolation": codes,
             "action_mode": modes,
             "clip_actions": flag("clip_actions", clip_actions),
-            "factors": factor_names(profile),
+            "factors": perturbation_names(profile),
             "perturbations": perturbations_json(perturbations),
             "mismatch_seed": mismatch_seed_text(mismatch_seed),
             "max_steps": steps,
@@ -105,7 +105,7 @@ class GameResults:
     #: (games, 2, 23), float32: the last observations of games that ended in this step, where it also began the next game.
     final_observations: Observation
     #: (games, 23): numbers about each game, such as its score, which the properties below name.
-    facts: Floats
+    game_info: Floats
     #: (games, 40): true states after the step.
     states: Floats
     #: (games, 2)
@@ -117,7 +117,7 @@ class GameResults:
         return cls(
             np.zeros((games, 2, 23), np.float32),
             np.zeros((games, 2, 23), np.float32),
-            np.zeros((games, _native.GAME_FACTS)),
+            np.zeros((games, _native.GAME_INFO_LEN)),
             np.zeros((games, _native.GAME_STATE_LEN)),
             np.zeros((games, 2)),
         )
@@ -127,72 +127,72 @@ class GameResults:
         return (
             self.observations.reshape(-1, 23),
             self.final_observations.reshape(-1, 23),
-            self.facts,
+            self.game_info,
             self.states,
         )
 
     @property
     def rally_ended(self) -> Bools:
         """[games] whether the step ended a rally."""
-        return self.facts[:, 0] >= 0.0
+        return self.game_info[:, 0] >= 0.0
 
     @property
     def rally_ends(self) -> npt.NDArray[np.object_]:
         """[games] how the rally ended; None while it is under way."""
-        ends = np.full(len(self.facts), None, object)
+        ends = np.full(len(self.game_info), None, object)
         for game in np.flatnonzero(self.rally_ended):
-            ends[game] = _native.RALLY_ENDS[int(self.facts[game, 0])]
+            ends[game] = _native.RALLY_ENDS[int(self.game_info[game, 0])]
         return ends
 
     @property
     def by(self) -> npt.NDArray[np.int64]:
-        """[games] the robot (0 or 1) that ended the rally, -1 without one."""
-        return self.facts[:, 1].astype(np.int64)
+        """[games] the robot (0 or 1) that scored, or on whose side the puck stayed too long; -1 without one."""
+        return self.game_info[:, 1].astype(np.int64)
 
     @property
     def constraints(self) -> Floats:
         """[games][2][4] values of the constraints, a copy."""
-        return self.facts[:, 2:10].reshape(-1, 2, 4).copy()
+        return self.game_info[:, 2:10].reshape(-1, 2, 4).copy()
 
     @property
     def diverged(self) -> Bools:
         """[games][2] whether the robot's commands made the world diverge in this step."""
-        return self.facts[:, 10:12] > 0.0
+        return self.game_info[:, 10:12] > 0.0
 
     @property
     def goals(self) -> npt.NDArray[np.int64]:
         """[games][2]"""
-        return self.facts[:, 12:14].astype(np.int64)
+        return self.game_info[:, 12:14].astype(np.int64)
 
     @property
     def fouls(self) -> npt.NDArray[np.int64]:
         """[games][2]"""
-        return self.facts[:, 14:16].astype(np.int64)
+        return self.game_info[:, 14:16].astype(np.int64)
 
     @property
     def score(self) -> npt.NDArray[np.int64]:
         """[games][2]"""
-        return self.facts[:, 16:18].astype(np.int64)
+        return self.game_info[:, 16:18].astype(np.int64)
 
     @property
     def points(self) -> npt.NDArray[np.int64]:
         """[games][2] points that the step added."""
-        return self.facts[:, 18:20].astype(np.int64)
+        return self.game_info[:, 18:20].astype(np.int64)
 
     @property
     def steps(self) -> npt.NDArray[np.int64]:
         """[games] control steps of the game; 0 if it has just begun."""
-        return self.facts[:, 20].astype(np.int64)
+        return self.game_info[:, 20].astype(np.int64)
 
     @property
     def numbers(self) -> npt.NDArray[np.int64]:
         """[games] the game's number; at its end that of the ended game."""
-        return self.facts[:, 21].astype(np.int64)
+        return self.game_info[:, 21].astype(np.int64)
 
     @property
     def is_over(self) -> Bools:
         """[games] whether the step ended the game."""
-        return self.facts[:, 22] > 0.0
+        return self.game_info[:, 22] > 0.0
 
 
 class GameBatch:

@@ -95,12 +95,13 @@ class AirHockeyGame(ParallelEnv[str, Observation, Any]):  # type: ignore[misc]
         """Begins the first game of ``seed``; without one, the next game of the last seed. ``options`` are ignored."""
         batch = self._batch
         batch.native  # noqa: B018 - refuses a closed environment before anything changes
-        first: int | None = None
+        # The seed whose first game begins; None: the next game of the last seed.
+        new_seed: int | None = None
         if seed is not None:
-            first = seed_number("seed", seed)
+            new_seed = seed_number("seed", seed)
         elif self._seed is None:
-            first = int(np.random.default_rng().integers(2**63))
-        batch.reset(np.ones(1, np.bool_), [first])
+            new_seed = int(np.random.default_rng().integers(2**63))
+        batch.reset(np.ones(1, np.bool_), [new_seed])
         [(self._seed, number)] = batch.native.origins()
         self.agents = list(AGENTS)
         self._render_human()
@@ -119,8 +120,9 @@ class AirHockeyGame(ParallelEnv[str, Observation, Any]):  # type: ignore[misc]
     ]:
         """One control step, 20 ms. ``actions`` has an action for each of ``agents``.
 
-        Infos have ``constraints``, ``score``, ``goals`` and ``fouls`` (robot 1 first), and ``rally_end`` if a rally
-        has ended.
+        Infos have ``constraints``, ``score``, ``goals`` and ``fouls`` (robot 1 first). If a rally has ended, they have
+        ``rally_end`` (how), and ``rally_end_by``: the robot that scored, or on whose side the puck stayed too long;
+        None after other ends.
         """
         batch = self._batch
         batch.native  # noqa: B018 - the error about a closed environment comes first

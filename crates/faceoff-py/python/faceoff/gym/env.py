@@ -44,9 +44,9 @@ class AirHockeyEnv(gymnasium.Env[Any, Any]):
             7, 7, 14, 14, 21, 14 or 420 numbers.
         action_mode: ``delta``, ``absolute`` or ``raw`` (docs/python.md, "Actions").
         clip_actions: clip numbers to their bounds instead of refusing them.
-        profile: perturbations of the world: the name of a profile, or names of factors.
+        profile: perturbations of the world: the name of a profile, or names of perturbations.
         perturbations: magnitudes that replace those of the ruleset, as in ``{"tracking_loss": {"probability": 0.0}}``.
-        mismatch_seed: seed of the arm's deviation from its model, if that factor is active; by default it follows from
+        mismatch_seed: seed of the arm's deviation from its model, if that perturbation is active; by default it follows from
             the seed of ``reset``, so that each seed has its own robot.
         max_episode_steps: control steps after which an episode is truncated, at most 500.
         reward: from a :class:`~faceoff.gym.reward.Transition` to a number, instead of the default reward.

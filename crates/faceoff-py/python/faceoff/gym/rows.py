@@ -26,7 +26,7 @@ class Rows:
     terminated: Bools
     truncated: Bools
     #: (worlds, 12): numbers about each world's episode, which the properties below name.
-    facts: Floats
+    episode_info: Floats
     #: (worlds, 33): true states after the step.
     states: Floats
     #: (worlds, 33): present true states, those of the new episode where one has begun.
@@ -42,7 +42,7 @@ class Rows:
             np.zeros(worlds),
             np.zeros(worlds, np.bool_),
             np.zeros(worlds, np.bool_),
-            np.zeros((worlds, _native.FACTS)),
+            np.zeros((worlds, _native.EPISODE_INFO_LEN)),
             np.zeros((state_rows, _native.STATE_LEN)),
             np.zeros((state_rows, _native.STATE_LEN)),
         )
@@ -61,7 +61,7 @@ class Rows:
             self.rewards,
             self.terminated,
             self.truncated,
-            self.facts,
+            self.episode_info,
             self.states,
             self.next_states,
         )
@@ -69,29 +69,29 @@ class Rows:
     @property
     def ends(self) -> npt.NDArray[np.int64]:
         """[worlds] index into ``_native.ENDS``, -1 while the episode is under way."""
-        return self.facts[:, 0].astype(np.int64)
+        return self.episode_info[:, 0].astype(np.int64)
 
     @property
     def success(self) -> Bools:
         """[worlds] whether the episode has ended in success."""
-        return self.facts[:, 1] > 0.0
+        return self.episode_info[:, 1] > 0.0
 
     @property
     def numbers(self) -> npt.NDArray[np.int64]:
         """[worlds] the episode's number; at an end that of the ended episode."""
-        return self.facts[:, 2].astype(np.int64)
+        return self.episode_info[:, 2].astype(np.int64)
 
     @property
     def steps(self) -> npt.NDArray[np.int64]:
         """[worlds] control steps of the episode so far."""
-        return self.facts[:, 3].astype(np.int64)
+        return self.episode_info[:, 3].astype(np.int64)
 
     @property
     def constraints(self) -> Floats:
         """[worlds][4] values of the constraints, a copy."""
-        return self.facts[:, 4:8].copy()
+        return self.episode_info[:, 4:8].copy()
 
     @property
     def violations(self) -> Bools:
         """[worlds][4] whether each constraint was violated in the episode."""
-        return self.facts[:, 8:12] > 0.0
+        return self.episode_info[:, 8:12] > 0.0

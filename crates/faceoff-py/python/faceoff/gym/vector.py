@@ -242,8 +242,8 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
         self, checked: Floats, before: tuple[npt.NDArray[np.float32], Floats]
     ) -> Step:
         rows = self._rows
-        ended = rows.facts[:, 0] >= 0.0
-        was_reset = rows.facts[:, 3] == 0.0
+        ended = rows.episode_info[:, 0] >= 0.0
+        was_reset = rows.episode_info[:, 3] == 0.0
         if self._reward is not None:
             rows.rewards[:] = self._custom_rewards(checked, before, ended)
             rows.rewards[was_reset] = 0.0
@@ -279,10 +279,10 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
             steps = np.zeros(self.num_envs, np.int64)
             # Few episodes end in a step, so only their rows are read.
             for world in np.flatnonzero(ended).tolist():
-                code, is_success, _, count = rows.facts[world, :4].tolist()
+                code, is_success, _, count = rows.episode_info[world, :4].tolist()
                 success[world] = is_success > 0.0
                 ends[world] = _native.ENDS[int(code)]
-                violations[world] = rows.facts[world, 8:12] > 0.0
+                violations[world] = rows.episode_info[world, 8:12] > 0.0
                 steps[world] = int(count)
             infos |= {"success": success, "end": ends, "violations": violations, "steps": steps}
             for name in ("success", "end", "violations", "steps"):

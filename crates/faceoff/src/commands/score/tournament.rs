@@ -170,6 +170,7 @@ mod tests {
         }
     }
 
+    /// A game that the home side wins whatever the score: with more than 135 penalty points the away side is non-deployable.
     fn game(round: u32, home: &str, away: &str, goals: [u32; 2]) -> Value {
         json!({"round": round, "home": home, "away": away, "goals": goals, "fouls": [4, 0],
                "penalty_points": [20, 140.5]})
@@ -237,6 +238,7 @@ mod tests {
 
     #[test]
     fn disqualified_team_is_ranked_last() {
+        // Zed wins by the tiers.
         let input = json!([game(1, "Zed", "Ajax", [0, 2])]);
         let (out, _) = score(table(&[], &["Zed=2"]), &input).unwrap();
         let position = |text: &str| out.find(text).unwrap();

@@ -23,7 +23,7 @@ use std::{
 /// Name of the file with the operator's token.
 pub const ADMIN_TOKEN_FILE: &str = "admin-token";
 
-/// Name of the file with the key that signs links. Backups do not contain it.
+/// Name of the file with the key that signs download links, from which the key of workers' grants derives. Backups do not contain it.
 const LINK_KEY_FILE: &str = "links.key";
 
 /// Name of the lock file, which is inside the data folder so that it moves with it.
@@ -206,7 +206,8 @@ fn write_secret(file: &Path, secret: &str) -> anyhow::Result<()> {
     write().with_context(|| format!("writing {}", file.display()))
 }
 
-/// Reads the key that signs links, or creates it at the first start. If the key is lost, existing links become invalid.
+/// Reads the key that signs download links, or creates it at the first start. The key that seals the grants of remote workers (access to
+/// the files of a job) derives from it. If the key is lost, existing download links and grants become invalid.
 ///
 /// # Errors
 /// If the key cannot be read or written, or is invalid.
@@ -220,7 +221,7 @@ pub fn load_or_create_link_key(data_dir: &Path) -> anyhow::Result<LinkKey> {
             )
         }),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            let key = LinkKey::generate().context("generating the key of links")?;
+            let key = LinkKey::generate().context("generating the key of download links")?;
             write_secret(&file, &key.to_hex())?;
             Ok(key)
         }

@@ -136,11 +136,18 @@ impl BenchArgs {
 
     /// Runs a game with as many windows as there are episodes; returns as [`play_episodes`](Self::play_episodes).
     fn play_game(&self) -> (u64, Duration) {
-        let (factors, settings) = (self.profile.factors(), PerturbationSettings::default());
+        let (active_perturbations, settings) = (
+            self.profile.active_perturbations(),
+            PerturbationSettings::default(),
+        );
         let setup = GameSetup {
             interpolation: [HOLD_INTERPOLATION; 2],
-            factors,
-            plant: Plant::for_factors(factors, &settings, self.seed.model_mismatch()),
+            active_perturbations,
+            plant: Plant::for_perturbations(
+                active_perturbations,
+                &settings,
+                self.seed.model_mismatch(),
+            ),
             settings,
             seed: self.seed,
         };

@@ -60,10 +60,15 @@ pub fn run() -> Result<()> {
 
 fn trace(scenario: &Scenario, out: &mut impl Write) -> Result<()> {
     let settings = PerturbationSettings::default();
-    let factors = scenario.profile.factors();
-    let plant = Plant::for_factors(factors, &settings, scenario.seed.model_mismatch());
+    let active_perturbations = scenario.profile.active_perturbations();
+    let plant = Plant::for_perturbations(
+        active_perturbations,
+        &settings,
+        scenario.seed.model_mismatch(),
+    );
     let mut world = World::new(&plant, &scenario.joints, scenario.puck);
-    let mut table = TablePerturbations::new(factors, &settings, &scenario.seed, &mut world);
+    let mut table =
+        TablePerturbations::new(active_perturbations, &settings, &scenario.seed, &mut world);
     let mut opponent = (scenario.task == Some(faceoff_sim::AirHockeyTask::Hit)).then(Opponent::new);
     let mut steps = 0;
     let mut end = None;
