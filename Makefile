@@ -134,15 +134,16 @@ test: setup-test
 
 # Parts of `make test`, in two rounds: the Rust tests use tools that the tests of agents and pages install.
 # The programs are built first, since the end-to-end tests run the real binary and the real agents. With --tests the
-# dependencies get the same features as in the test run below, and are built only once.
+# dependencies get the same features as in the test run below, and are built only once. Examples are checked by `make lint`.
 tests-built:
 	+$(CARGO) build --locked --workspace --bins --tests
 	tests/runtimes.sh "$(TARGET_DIR)"
 tests-of-rust:
 	+if $(CARGO) nextest --version >/dev/null 2>&1; \
-	    then $(CARGO) nextest run --locked --workspace --no-fail-fast --test-threads $(TEST_THREADS); \
-	    else $(CARGO) test --locked --workspace --no-fail-fast -- --test-threads $(TEST_THREADS); fi
+	    then $(CARGO) nextest run --locked --workspace --lib --bins --tests --no-fail-fast --test-threads $(TEST_THREADS); \
+	    else $(CARGO) test --locked --workspace --lib --bins --tests --no-fail-fast -- --test-threads $(TEST_THREADS); fi
 tests-of-python:
+	python3 tests/costs/compiled_once.py
 	TARGET_DIR="$(TARGET_DIR)" crates/faceoff-py/test.sh test
 tests-of-api:
 	TARGET_DIR="$(TARGET_DIR)" tests/api/test.sh
