@@ -4,7 +4,11 @@
 //! later agent reads. So an agent may start few sessions, and after its end a random number of them is skipped, up to many times its own.
 //! Two agents that run at once can still see each other's sessions.
 
-use rustix::rand::{GetRandomFlags, getrandom};
+use crate::affinity;
+use rustix::{
+    rand::{GetRandomFlags, getrandom},
+    thread::sched_getcpu,
+};
 use std::time::{Duration, Instant};
 
 /// Number of sessions that an agent may start at once; the first is bubblewrap's.
@@ -49,12 +53,15 @@ impl SessionBudget {
     }
 }
 
-/// Starts a random number of sessions that end at once, after an agent that has started `started` sessions.
+/// Starts a random number of sessions that end at once, after an agent that has started `started` sessions. The calling thread stays on
+/// the CPU on which it is.
 pub(crate) fn skip_some(started: u32) {
     let mut random = [0; 4];
     if getrandom(&mut random, GetRandomFlags::empty()).is_err() {
         return;
     }
+    // Otherwise each process is started on another CPU, which must wake up first. Without this the numbers are skipped, too, but later.
+    let _ = affinity::pin_current_thread(&[sched_getcpu()]);
     let limit = MAX_SKIPPED.max(started.saturating_mul(MAX_SKIPPED_PER_SESSION));
     for _ in 0..u32::from_ne_bytes(random) % limit {
         if !skip_one() {
