@@ -13,6 +13,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 
 import changes
+import compiled_once
 import elf
 import report
 import runs
@@ -282,6 +283,28 @@ class Readers(unittest.TestCase):
         self.assertEqual(row.text(), "552 s (561, 540, 552)")
         self.assertEqual(report.Row("program", [39_999_999], "bytes", "").text(), "39,999,999 bytes")
         self.assertEqual(report.Row("test", [1.26], "s", "").text(), "1.3 s")
+
+
+class CompiledOnce(unittest.TestCase):
+    """Crates that a build of the workspace and the wheel compile more than once."""
+
+    def library(self, name: str, file: str, *features: str) -> compiled_once.Library:
+        return compiled_once.Library(f"registry+https://github.com/rust-lang/crates.io-index#{name}@1.0.0", features, file)
+
+    def test_crate_with_two_sets_of_features_is_found(self) -> None:
+        workspace = {self.library("syn", "libsyn-1.rlib", "full"), self.library("syn", "libsyn-2.rlib", "full", "fold")}
+        found = compiled_once.find_repetitions(workspace, workspace)
+        self.assertEqual(found, ["twice in the workspace: syn@1.0.0: fold / none of them"])
+
+    def test_crate_that_the_wheel_compiles_again_is_found(self) -> None:
+        workspace = {self.library("rapier", "librapier-1.rlib", "std")}
+        wheel = {self.library("rapier", "librapier-2.rlib", "std"), self.library("pyo3", "libpyo3-1.rlib")}
+        found = compiled_once.find_repetitions(workspace, wheel)
+        self.assertEqual(found, ["again for the wheel: rapier@1.0.0: the same features, so a dependency differs"])
+
+    def test_crates_that_are_compiled_once_are_not_listed(self) -> None:
+        workspace = {self.library("syn", "libsyn-1.rlib", "full"), self.library("rapier", "librapier-1.rlib")}
+        self.assertEqual(compiled_once.find_repetitions(workspace, {self.library("syn", "libsyn-1.rlib", "full")}), [])
 
 
 if __name__ == "__main__":
