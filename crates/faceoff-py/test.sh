@@ -46,6 +46,8 @@ case ${1:-} in
         "$target/python-test/bin/python" -m mypy --config-file "$here/pyproject.toml" "$here/python/faceoff"
         "$target/python-test/bin/python" -m mypy --config-file "$here/pyproject.toml" "$root"/agents/examples/*.py
         export TARGET_DIR="$target" FACEOFF_BIN="${FACEOFF_BIN:-$target/debug/faceoff}"
+        # Threads of numpy's BLAS wait for each other in loops. Beside other tests, small matrices then take many times as long.
+        export OPENBLAS_NUM_THREADS=1
         FACEOFF_READERS="$target/python-readers" FACEOFF_SKIP_NOTHING=1 \
             "$target/python-test/bin/python" -m pytest -p no:cacheprovider -rs --durations 12 --rootdir "$here" \
             "$here/tests" "$root/agents/examples" "$@"

@@ -34,7 +34,8 @@ def built_libraries(*arguments: str) -> set[Library]:
         if message["reason"] != "compiler-artifact" or message["profile"]["test"]:
             continue
         if {"lib", "proc-macro"} & set(message["target"]["kind"]):
-            libraries.add(Library(message["package_id"], tuple(message["features"]), message["filenames"][0]))
+            # The last file, since the first one of a requested library is a copy without the hash.
+            libraries.add(Library(message["package_id"], tuple(message["features"]), message["filenames"][-1]))
     return libraries
 
 
