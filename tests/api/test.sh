@@ -23,7 +23,7 @@ if [ "$(cat "$target/api-typescript/made-of" 2>/dev/null)" != "$required" ]; the
 fi
 
 export FACEOFF_BIN="${FACEOFF_BIN:-$target/debug/faceoff}" API_TYPESCRIPT="$target/api-typescript"
-# schemathesis writes its files into the current folder.
+# schemathesis writes its files into the current folder. The tests of the three roles, which take longest, run at once.
 cd "$target/api-test"
-PATH="$target/api-test/bin:$PATH" exec "$target/api-test/bin/python" -m pytest -p no:cacheprovider -rs --durations 8 \
+PATH="$target/api-test/bin:$PATH" exec "$target/api-test/bin/python" -m pytest -n 3 -p no:cacheprovider -rs --durations 8 \
     --rootdir "$here" "$here" "$@"
