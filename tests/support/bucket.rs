@@ -22,6 +22,9 @@ pub struct Bucket {
 const NAME: &str = "matches";
 
 impl Bucket {
+    /// Beginning of the keys of all objects that the server stores; part of [`Self::url`].
+    pub const PREFIX: &str = "of/season";
+
     /// Starts a server with an empty bucket.
     ///
     /// # Panics
@@ -69,7 +72,7 @@ impl Bucket {
     /// `s3://…`, for a configuration.
     #[must_use]
     pub fn url(&self) -> String {
-        format!("s3://{NAME}/of/season")
+        format!("s3://{NAME}/{}", Self::PREFIX)
     }
 
     /// The address of its server.

@@ -67,7 +67,7 @@ pub struct Conditions<'a> {
     pub perturbations: &'a Magnitudes,
     /// The seed from which the seeds of the episodes are derived.
     pub seed: Seed,
-    /// The seed from which the season's deviations of the model are drawn.
+    /// The seed of the season's model mismatch: how the simulated robot deviates from the nominal model that agents know.
     pub mismatch_seed: Seed,
 }
 

@@ -3,7 +3,7 @@
 
 use crate::{
     address::WebhookRules,
-    boxed,
+    boxed_future,
     feed::Feed,
     notice::{Audience, Notice},
     notice_filter::NoticeFilter,
@@ -110,7 +110,7 @@ impl Deliverer {
     }
 
     /// Delivers until `shutdown`. Database errors are retried.
-    #[boxed]
+    #[boxed_future]
     pub async fn run(self, shutdown: CancellationToken) {
         let mut active = ActiveDeliveries::default();
         let mut changes = self.store.events();
@@ -153,7 +153,7 @@ impl Deliverer {
     ///
     /// # Errors
     /// If the database fails.
-    #[boxed]
+    #[boxed_future]
     pub async fn deliver_due(&self) -> Result<(), StoreError> {
         let mut active = ActiveDeliveries::default();
         loop {

@@ -1,7 +1,7 @@
 //! The feed of the event log: its events as notices, page by page. Its *followers* are webhooks and clients of the API's event
 //! stream. Each page is read once for all of them. The Atom feed of the pages does not use it.
 
-use crate::{boxed, notice::Notice, stage_visibility::StageVisibility};
+use crate::{boxed_future, notice::Notice, stage_visibility::StageVisibility};
 use faceoff_store::{Store, StoreError, Subject, SubjectContext};
 use std::{
     collections::{HashMap, VecDeque},
@@ -47,7 +47,7 @@ impl Feed {
     ///
     /// # Errors
     /// If the log cannot be read.
-    #[boxed]
+    #[boxed_future]
     pub async fn page_after(&self, event: i64) -> Result<Option<Arc<Page>>, StoreError> {
         let mut cache = self.cache.lock().await;
         // Pages never change: newer events are on later pages.

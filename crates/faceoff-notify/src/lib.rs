@@ -18,9 +18,9 @@ mod sender;
 mod stage_visibility;
 mod topic;
 
-/// `#[boxed]` on a public `async fn` makes it return a boxed future, so that its body is compiled once, here, and not in each crate
-/// that awaits it.
-pub(crate) use async_recursion::async_recursion as boxed;
+/// `#[boxed_future]` on a public `async fn` makes it return a boxed future, so that its body is compiled once, here, and not in each
+/// crate that awaits it.
+pub(crate) use async_recursion::async_recursion as boxed_future;
 
 pub use address::{NotPublic, WebhookRules};
 pub use deliverer::{Deliverer, message};

@@ -1,7 +1,7 @@
 //! Visibility of the stages' results to the public. The results of a *blind* stage are hidden until the organisers reveal
 //! them; after a stage's boards are *frozen*, new results are hidden.
 
-use crate::boxed;
+use crate::boxed_future;
 use faceoff_store::{Store, StoreError};
 use faceoff_types::StageId;
 use jiff::Timestamp;
@@ -24,7 +24,7 @@ impl StageVisibility {
     ///
     /// # Errors
     /// If the database cannot be read.
-    #[boxed]
+    #[boxed_future]
     pub async fn read(store: &Store) -> Result<Self, StoreError> {
         let freeze_times: HashMap<StageId, Timestamp> = store
             .frozen_boards()

@@ -8,7 +8,7 @@ use super::{
     assets,
     chart::{LabelledRate, RateChart},
     format,
-    frame::{Frame, PageProblem, render},
+    frame::{Frame, NO_ENTRY, PageProblem, render},
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
@@ -115,7 +115,7 @@ pub(super) async fn page(
     let clips = AblationClips::load(&app, viewer?, id).await?;
     let outcome_changes = clips.differing_episodes(&app).await?.into_iter();
     render(&Page {
-        frame: Frame::load(&app, "").await?,
+        frame: Frame::load(&app, NO_ENTRY).await?,
         legend: legend.join(", "),
         style: assets::EPISODES_STYLE.url(),
         id,

@@ -288,7 +288,7 @@ pub(super) async fn by_task(
         violation_columns: competition
             .violations
             .iter()
-            .map(|info| info.column.clone())
+            .map(|info| info.column_heading.clone())
             .collect(),
         groups: context.groups(|row| TaskRow::new(row, &row.tasks[&task], &context, &competition)),
         baselines: baselines::rows(&board),

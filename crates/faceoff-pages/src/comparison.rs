@@ -5,7 +5,7 @@ pub(super) mod pair;
 
 use super::{
     format,
-    frame::{Frame, PageProblem, render},
+    frame::{Frame, NO_ENTRY, PageProblem, render},
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
@@ -134,7 +134,7 @@ pub(super) async fn page(
         .collect();
     let overall = &view.overall;
     render(&Page {
-        frame: Frame::load(&app, "").await?,
+        frame: Frame::load(&app, NO_ENTRY).await?,
         rows,
         score_a: format::one_decimal(overall.score_a),
         score_b: format::one_decimal(overall.score_b),

@@ -211,7 +211,7 @@ const DONE_TEXTS: &[(&str, &str)] = &[
 ];
 
 impl DashboardHeader {
-    /// `current`: path of the page.
+    /// `current`: path of the page, or [`NO_ENTRY`](crate::frame::NO_ENTRY) if it has no tab.
     pub(super) fn new(caller: &Caller, current: &str, notice: Notice<'_>) -> Self {
         let (groups, title): (&[TabGroup], _) = match caller.is_organiser() {
             true => (&ORGANISER_TABS, "Organiser dashboard"),

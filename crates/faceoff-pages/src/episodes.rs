@@ -7,7 +7,7 @@ pub(super) mod still;
 
 use super::{
     assets,
-    frame::{Frame, PageProblem, render},
+    frame::{Frame, NO_ENTRY, PageProblem, render},
     table_drawing::TableOutline,
 };
 use crate::query::with_query;
@@ -150,7 +150,7 @@ pub(super) async fn page(
         .can_see_observations
         .then(|| ("late".to_owned(), "a late answer".to_owned()));
     render(&Page {
-        frame: Frame::load(&app, "").await?,
+        frame: Frame::load(&app, NO_ENTRY).await?,
         styles: [
             assets::EPISODES_STYLE.url(),
             assets::EPISODE_LIST_STYLE.url(),

@@ -6,7 +6,7 @@ mod slow_answers;
 use super::{
     chart::{AnswerTimeChart, TimeBin, TimeSummary},
     format,
-    frame::{Frame, PageProblem, render},
+    frame::{Frame, NO_ENTRY, PageProblem, render},
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
@@ -294,7 +294,7 @@ pub(super) async fn page(
     };
     render(&Page {
         violation_headers: format::violation_headers(app.config.competition()),
-        frame: Frame::load(&app, "")
+        frame: Frame::load(&app, NO_ENTRY)
             .await?
             .with_address(&app, &format!("/evaluations/{id}"))
             .with_card(

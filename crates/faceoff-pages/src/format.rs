@@ -233,7 +233,7 @@ pub(super) struct ViolationHeader {
 /// The column headers of all kinds of violations.
 pub(super) fn violation_headers(competition: &Competition) -> Vec<ViolationHeader> {
     let head = |info: &ViolationInfo| ViolationHeader {
-        title: capitalised(&info.column),
+        title: capitalised(&info.column_heading),
         points: info.points_with_unit(),
     };
     competition.violations.iter().map(head).collect()

@@ -49,8 +49,11 @@ pub(super) struct Frame {
     pub(super) address: Option<String>,
 }
 
+/// In place of the path of a page to which no entry of the navigation leads, so that none is marked as current.
+pub(super) const NO_ENTRY: &str = "";
+
 impl Frame {
-    /// The frame of a page that names the season. `current` is the path of the page; empty if no navigation entry leads to it.
+    /// The frame of a page that names the season. `current` is the path of the page, or [`NO_ENTRY`].
     pub(super) async fn load(app: &AppState, current: impl Into<String>) -> Result<Self, Problem> {
         let season = SeasonSummary::load(app).await?;
         Ok(Self::for_app(app, season.name, current))
@@ -223,7 +226,7 @@ impl IntoResponse for PageProblem {
     fn into_response(self) -> Response {
         let kind = self.0.kind();
         let page = ProblemPage {
-            frame: Frame::without_season(""),
+            frame: Frame::without_season(NO_ENTRY),
             title: kind.title(),
             detail: format::sentence(self.0.detail()),
             status: kind.status().as_u16(),

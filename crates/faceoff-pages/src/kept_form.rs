@@ -4,7 +4,7 @@
 
 use crate::{
     format,
-    frame::{Frame, PageProblem, ServerFault, render},
+    frame::{Frame, NO_ENTRY, PageProblem, ServerFault, render},
     page_auth::form_path,
 };
 use askama::Template;
@@ -110,7 +110,7 @@ struct Page {
 /// The page from which a user who has signed in sends the form.
 pub(super) async fn page(app: &App, form: KeptForm) -> Result<Response, PageProblem> {
     render(&Page {
-        frame: Frame::load(app, "").await?,
+        frame: Frame::load(app, NO_ENTRY).await?,
         form,
         fault: None,
     })
@@ -125,7 +125,7 @@ pub(super) fn page_after_fault(
     response: Response,
 ) -> Response {
     let page = Page {
-        frame: Frame::for_app(app, String::new(), ""),
+        frame: Frame::for_app(app, String::new(), NO_ENTRY),
         form,
         fault: Some(fault),
     };

@@ -3,7 +3,7 @@
 use super::{
     assets,
     episode_text::describe_violation,
-    frame::{Frame, PageProblem, render},
+    frame::{Frame, NO_ENTRY, PageProblem, render},
     replay_section::ReplaySection,
     side_by_side::neighbours,
 };
@@ -73,7 +73,7 @@ pub(super) async fn page(
     let view = EpisodeReplay::load(&app, viewer?, path?).await?;
     let own_path = page_path(view.id, view.task, view.episode);
     render(&Page {
-        frame: Frame::load(&app, "")
+        frame: Frame::load(&app, NO_ENTRY)
             .await?
             .with_address(&app, &own_path)
             .with_card(
@@ -92,7 +92,7 @@ pub(super) async fn embedded(
 ) -> Result<Response, PageProblem> {
     let view = EpisodeReplay::load(&app, Viewer::Visitor, path?).await?;
     let mut response = render(&EmbeddedPage {
-        frame: Frame::without_season(""),
+        frame: Frame::without_season(NO_ENTRY),
         view: EpisodeReplay {
             replay: ReplaySection {
                 observed_url: None,

@@ -4,7 +4,7 @@ mod days;
 
 use super::{
     chart::DayChart,
-    frame::{Frame, PageProblem, render},
+    frame::{Frame, NO_ENTRY, PageProblem, render},
     query::with_query,
     submission_row::SubmissionRow,
 };
@@ -99,7 +99,7 @@ pub(super) async fn page(
         .filter(|other| other.id != stage.id);
     render(&Page {
         tournaments: entered_tournaments(&app, id).await?,
-        frame: Frame::load(&app, "")
+        frame: Frame::load(&app, NO_ENTRY)
             .await?
             .with_address(&app, &format!("/teams/{id}"))
             .with_card(

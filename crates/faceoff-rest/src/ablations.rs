@@ -3,7 +3,7 @@
 
 use super::{
     clip_response::send,
-    document::{Binary, TagHeader},
+    document::{Binary, IfNoneMatchHeader},
     episode_count::checked_episodes,
 };
 use axum::{
@@ -58,7 +58,7 @@ pub(crate) async fn ablation(
     get, path = "/submissions/{id}/ablation/{profile}/{task}/{episode}/motion", tag = "public",
     security((), ("team" = []), ("organiser" = [])),
     params(
-        ("id" = SubmissionId, Path), ("profile" = Profile, Path), ("task" = Task, Path), ("episode" = u32, Path), TagHeader,
+        ("id" = SubmissionId, Path), ("profile" = Profile, Path), ("task" = Task, Path), ("episode" = u32, Path), IfNoneMatchHeader,
     ),
     responses(
         (status = 200, body = inline(Binary), content_type = "application/octet-stream"),
@@ -83,7 +83,7 @@ pub(crate) async fn ablation_motion(
     get, path = "/submissions/{id}/ablation/{profile}/{task}/{episode}/observed", tag = "team",
     security(("team" = []), ("organiser" = [])),
     params(
-        ("id" = SubmissionId, Path), ("profile" = Profile, Path), ("task" = Task, Path), ("episode" = u32, Path), TagHeader,
+        ("id" = SubmissionId, Path), ("profile" = Profile, Path), ("task" = Task, Path), ("episode" = u32, Path), IfNoneMatchHeader,
     ),
     responses(
         (status = 200, body = inline(Binary), content_type = "application/octet-stream"),

@@ -1,6 +1,6 @@
 //! Boards, which rank the teams of a stage, overall and by task; and their history day by day. As JSON or CSV.
 
-use super::{board_csv, document::TagHeader, downloads::send_tagged};
+use super::{board_csv, document::IfNoneMatchHeader, downloads::send_tagged};
 use axum::{
     Json,
     extract::State,
@@ -27,7 +27,7 @@ use serde::Serialize;
 /// Returns the overall board of a stage.
 #[utoipa::path(
     get, path = "/board", tag = "public", security((), ("team" = []), ("organiser" = [])),
-    params(BoardQuery, TagHeader),
+    params(BoardQuery, IfNoneMatchHeader),
     responses(
         (status = 200, content((BoardView = "application/json"), (String = "text/csv"))),
         (status = 401, description = "`live` needs an organiser's token, and the request has none, or the token is invalid"),
@@ -48,7 +48,7 @@ pub(crate) async fn board(
 /// Returns the board of one task, ranked by its success rate and its penalty points.
 #[utoipa::path(
     get, path = "/board/{task}", tag = "public", security((), ("team" = []), ("organiser" = [])),
-    params(("task" = Task, Path), BoardQuery, TagHeader),
+    params(("task" = Task, Path), BoardQuery, IfNoneMatchHeader),
     responses(
         (status = 200, content((BoardView = "application/json"), (String = "text/csv"))),
         (status = 401, description = "`live` needs an organiser's token, and the request has none, or the token is invalid"),
@@ -70,7 +70,7 @@ pub(crate) async fn task_board(
 /// Returns the results and ranks of all teams, day by day.
 #[utoipa::path(
     get, path = "/board/history", tag = "public", security((), ("team" = []), ("organiser" = [])),
-    params(HistoryQuery, TagHeader),
+    params(HistoryQuery, IfNoneMatchHeader),
     responses(
         (status = 200, content((HistoryView = "application/json"), (String = "text/csv"))),
         (status = 401, description = "`live` needs an organiser's token, and the request has none, or the token is invalid"),

@@ -2,7 +2,7 @@
 
 use super::{
     clip_response::send,
-    document::{Binary, TagHeader},
+    document::{Binary, IfNoneMatchHeader},
     downloads::send_tagged,
 };
 use axum::{
@@ -30,11 +30,11 @@ use faceoff_types::EvaluationId;
 #[utoipa::path(
     get, path = "/evaluations/{id}/episodes", tag = "public",
     security((), ("team" = []), ("organiser" = [])),
-    params(("id" = EvaluationId, Path), TagHeader),
+    params(("id" = EvaluationId, Path), IfNoneMatchHeader),
     responses(
         (status = 200, body = EpisodesView),
         (status = 404),
-        (status = 409, description = "no result, its day is not released, its stage is blind or its boards are frozen, or an older server version ran it"),
+        (status = 409, description = "no result, its day is not released, its stage hides results (blind) or its boards are frozen, or an older server version ran it"),
         (status = 410, description = "the recording was removed; the detail says when and by which retention rule"),
     )
 )]
@@ -65,11 +65,11 @@ pub(crate) async fn episodes(
 #[utoipa::path(
     get, path = "/evaluations/{id}/episodes/{task}/{episode}/motion", tag = "public",
     security((), ("team" = []), ("organiser" = [])),
-    params(("id" = EvaluationId, Path), ("task" = faceoff_types::Task, Path), ("episode" = u32, Path), TagHeader),
+    params(("id" = EvaluationId, Path), ("task" = faceoff_types::Task, Path), ("episode" = u32, Path), IfNoneMatchHeader),
     responses(
         (status = 200, body = inline(Binary), content_type = "application/octet-stream"),
         (status = 404),
-        (status = 409, description = "no result, its day is not released, its stage is blind or its boards are frozen, or an older server version ran it"),
+        (status = 409, description = "no result, its day is not released, its stage hides results (blind) or its boards are frozen, or an older server version ran it"),
         (status = 410, description = "the recording was removed"),
     )
 )]
@@ -91,12 +91,12 @@ pub(crate) async fn motion(
 #[utoipa::path(
     get, path = "/evaluations/{id}/episodes/{task}/{episode}/observed", tag = "team",
     security((), ("team" = []), ("organiser" = [])),
-    params(("id" = EvaluationId, Path), ("task" = faceoff_types::Task, Path), ("episode" = u32, Path), TagHeader),
+    params(("id" = EvaluationId, Path), ("task" = faceoff_types::Task, Path), ("episode" = u32, Path), IfNoneMatchHeader),
     responses(
         (status = 200, body = inline(Binary), content_type = "application/octet-stream"),
         (status = 403, description = "the evaluation belongs to another team and is not public"),
         (status = 404),
-        (status = 409, description = "no result, its day is not released, its stage is blind or its boards are frozen, or an older server version ran it"),
+        (status = 409, description = "no result, its day is not released, its stage hides results (blind) or its boards are frozen, or an older server version ran it"),
         (status = 410, description = "the recording was removed"),
     )
 )]

@@ -19,7 +19,7 @@ use faceoff_types::EvaluationId;
     responses(
         (status = 200, body = ComparisonView),
         (status = 404),
-        (status = 409, description = "the episodes differ (“field” says why), an evaluation is not finished, its stage is blind, or its day is not released"),
+        (status = 409, description = "the episodes differ (“field” says why), an evaluation is not finished, its stage hides results (blind), or its day is not released"),
     )
 )]
 pub(crate) async fn compare(

@@ -2,7 +2,7 @@
 //! constraints.
 
 use super::{
-    document::{Binary, FileHeaders, TagHeader},
+    document::{Binary, FileHeaders, IfNoneMatchHeader},
     downloads::{Download, download, file_stem, send_tagged},
     proposals,
     stored_dataset::StoredDataset,
@@ -45,7 +45,7 @@ use faceoff_types::EvaluationId;
         (status = 200, body = inline(Binary), content_type = "application/zip"),
         (status = 403, description = "the link is invalid"),
         (status = 404),
-        (status = 409, description = "the evaluation has not finished or has failed, its day is not released, or its stage is blind"),
+        (status = 409, description = "the evaluation has not finished or has failed, its day is not released, or its stage hides results (blind)"),
         (status = 410, description = "the dataset was removed, by a retention rule or with its proposal; the detail says when and why; or the link has expired"),
     )
 )]
@@ -90,7 +90,7 @@ pub(crate) async fn dataset(
     responses(
         (status = 201, body = LinkView),
         (status = 404),
-        (status = 409, description = "the evaluation has not finished or has failed, its day is not released, or its stage is blind"),
+        (status = 409, description = "the evaluation has not finished or has failed, its day is not released, or its stage hides results (blind)"),
         (status = 410, description = "the dataset was removed"),
         (status = 422),
     )
@@ -113,11 +113,11 @@ pub(crate) async fn link_dataset(
 #[utoipa::path(
     get, path = "/evaluations/{id}/violations", tag = "team",
     security((), ("team" = []), ("organiser" = [])),
-    params(("id" = EvaluationId, Path), TagHeader),
+    params(("id" = EvaluationId, Path), IfNoneMatchHeader),
     responses(
         (status = 200, body = ViolationsView),
         (status = 404),
-        (status = 409, description = "the evaluation has not finished or has failed, its day is not released, or its stage is blind"),
+        (status = 409, description = "the evaluation has not finished or has failed, its day is not released, or its stage hides results (blind)"),
         (status = 410, description = "the dataset was removed; the detail says when and by which retention rule"),
     )
 )]
@@ -146,7 +146,7 @@ pub(crate) async fn violations(
     responses(
         (status = 200, body = EvaluationView),
         (status = 404),
-        (status = 409, description = "the evaluation has not finished, its day is not released, its stage is blind, or its boards are frozen before its result"),
+        (status = 409, description = "the evaluation has not finished, its day is not released, its stage hides results (blind), or its boards are frozen before its result"),
     )
 )]
 pub(crate) async fn publish_evaluation(

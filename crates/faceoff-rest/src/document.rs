@@ -1,4 +1,4 @@
-//! The OpenAPI document: everything that is not derived from the routes and types.
+//! The OpenAPI document: what `utoipa` does not derive from the routes and types.
 
 mod competition_schemas;
 mod conditional_requests;
@@ -8,7 +8,7 @@ mod paged_lists;
 mod responses;
 mod unsigned_integers;
 
-pub(super) use conditional_requests::{FileHeaders, TagHeader};
+pub(super) use conditional_requests::{FileHeaders, IfNoneMatchHeader};
 use faceoff_service::problem::ProblemBody;
 use faceoff_types::Competition;
 use serde_json::Value;
@@ -68,7 +68,8 @@ impl Modify for SecuritySchemes {
     }
 }
 
-/// Completes the document, which is derived from the routes and types, with everything that follows from them and from the competition.
+/// Adds what `utoipa` cannot derive from the routes and types: common responses, corrected schemas, deprecated fields, and what
+/// depends on the competition.
 pub(super) fn complete(mut document: openapi::OpenApi, competition: &Competition) -> Value {
     responses::complete(&mut document);
     let components = document.components.get_or_insert_default();

@@ -3,7 +3,7 @@
 
 use super::{
     clip_response::send,
-    document::{Binary, TagHeader},
+    document::{Binary, IfNoneMatchHeader},
     game_files::parse_side,
 };
 use axum::{extract::State, http::HeaderMap, response::Response};
@@ -23,7 +23,7 @@ use faceoff_types::GameId;
 #[utoipa::path(
     get, path = "/games/{id}/motion/{chunk}", tag = "public",
     security((), ("team" = []), ("organiser" = [])),
-    params(("id" = GameId, Path), ("chunk" = u32, Path), TagHeader),
+    params(("id" = GameId, Path), ("chunk" = u32, Path), IfNoneMatchHeader),
     responses(
         (status = 200, body = inline(Binary), content_type = "application/octet-stream"),
         (status = 404),
@@ -57,7 +57,7 @@ pub(crate) async fn game_motion(
     security((), ("team" = []), ("organiser" = [])),
     params(
         ("id" = GameId, Path), ("side" = u32, Path, minimum = 1, maximum = 2, description = "1: home, 2: away"),
-        ("chunk" = u32, Path), TagHeader,
+        ("chunk" = u32, Path), IfNoneMatchHeader,
     ),
     responses(
         (status = 200, body = inline(Binary), content_type = "application/octet-stream"),

@@ -148,7 +148,7 @@ pub(crate) async fn apply_proposal(
     Body(Confirmation { confirm }): Body<Confirmation>,
 ) -> Result<Json<ProposalView>, Problem> {
     let view = proposal::find(&app, id).await?;
-    if let (Some(day), ProposalStateView::Played, Some(outcome)) =
+    if let (Some(day), ProposalStateView::Finished, Some(outcome)) =
         (view.day, view.state, &view.outcome)
     {
         let rank_changes = outcome

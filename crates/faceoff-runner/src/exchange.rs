@@ -357,7 +357,7 @@ impl<'w> Exchange<'w> {
                 // Includes the threads that it has started since the question.
                 self.process.track_threads();
             }
-            wait.add_sample(self.process.sample_cpus());
+            wait.add_sample(self.process.read_cpus());
             // Counted from the check above: a delay of the evaluator after the check counts as lateness.
             wait.schedule_wake(now);
         }
@@ -394,13 +394,13 @@ impl<'w> Exchange<'w> {
         let interference = self.process.interference_since(
             wait.asked_at,
             wait.samples(),
-            wait.baseline_cpus(),
+            wait.cpu_baseline(),
             answer,
         );
         let evaluator = self
             .evaluator_cpus
             .as_deref()
-            .zip(wait.baseline_evaluator());
+            .zip(wait.evaluator_baseline());
         let counters = WaitCounters {
             now,
             run_delay: interference.map(|interference| interference.run_delay),

@@ -110,7 +110,7 @@ impl AnswerWait {
     pub fn add_sample(&mut self, reading: Option<CpuReading>) {
         match (&mut self.late_samples, reading) {
             (None, reading) => {
-                let begin = |now| CpuSamples::begin(now, self.baseline_cpus(), self.asked_at);
+                let begin = |now| CpuSamples::begin(now, self.cpu_baseline(), self.asked_at);
                 self.late_samples = Some(reading.map(begin));
             }
             (Some(Some(samples)), Some(reading)) => samples.add(reading),
@@ -119,12 +119,12 @@ impl AnswerWait {
     }
 
     /// Counters of the agent's CPUs before the question.
-    pub fn baseline_cpus(&self) -> Option<&CpuReading> {
+    pub fn cpu_baseline(&self) -> Option<&CpuReading> {
         self.baseline.as_ref()?.cpus.as_ref()
     }
 
     /// Counters of the evaluator's own thread before the question.
-    pub fn baseline_evaluator(&self) -> Option<&EvaluatorCounters> {
+    pub fn evaluator_baseline(&self) -> Option<&EvaluatorCounters> {
         self.baseline.as_ref()?.evaluator.as_ref()
     }
 

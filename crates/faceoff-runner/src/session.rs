@@ -50,10 +50,10 @@ impl Session<'static> {
     /// The failure, and the agent's standard error (its beginning and end, if it is long).
     pub fn start(
         bundle: &Bundle,
-        env: &AgentEnvironment,
+        environment: &AgentEnvironment,
         agent_task: AgentTask,
     ) -> Result<Self, (SessionError, String)> {
-        Self::start_monitored(bundle, env, agent_task, &KernelCounters)
+        Self::start_monitored(bundle, environment, agent_task, &KernelCounters)
     }
 }
 
@@ -61,17 +61,17 @@ impl<'w> Session<'w> {
     /// [`Session::start`] with another monitor of host interference.
     pub(crate) fn start_monitored(
         bundle: &Bundle,
-        env: &AgentEnvironment,
+        environment: &AgentEnvironment,
         agent_task: AgentTask,
         monitor: &'w dyn InterferenceMonitor,
     ) -> Result<Self, (SessionError, String)> {
-        let mut exchange =
-            Exchange::start(bundle, env, monitor).map_err(|error| (error, String::new()))?;
+        let mut exchange = Exchange::start(bundle, environment, monitor)
+            .map_err(|error| (error, String::new()))?;
         let stated_interpolation = bundle.manifest.interpolation;
-        match exchange_hello(&mut exchange, agent_task, stated_interpolation, env) {
+        match exchange_hello(&mut exchange, agent_task, stated_interpolation, environment) {
             Ok((layout, startup_s)) => Ok(Self {
                 exchange,
-                time: env.time.clone(),
+                time: environment.time.clone(),
                 layout,
                 startup_s,
                 pending: None,
@@ -276,20 +276,21 @@ fn exchange_hello(
     exchange: &mut Exchange<'_>,
     agent_task: AgentTask,
     stated_interpolation: Option<i64>,
-    env: &AgentEnvironment,
+    environment: &AgentEnvironment,
 ) -> Result<(ActionLayout, f64), SessionError> {
-    let constants = env.simulator.hello_env(agent_task)?;
+    let constants = environment.simulator.hello_env(agent_task)?;
     if constants.contains(['\n', '\r']) {
-        let problem = "env has several lines".to_owned();
+        let problem = "hello's field env has several lines".to_owned();
         return Err(PlatformFault::Simulator(problem).into());
     }
-    let constants = RawValue::from_string(constants)
-        .map_err(|error| PlatformFault::Simulator(format!("env is not JSON: {error}")))?;
+    let constants = RawValue::from_string(constants).map_err(|error| {
+        PlatformFault::Simulator(format!("hello's field env is not JSON: {error}"))
+    })?;
     let hello = Message::hello(agent_task, &constants);
     // The agent's time begins when its sandbox exists; the set-up is the platform's time.
-    let mut sent = exchange.send(&hello, Phase::StartUp, env.time.startup_s)?;
+    let mut sent = exchange.send(&hello, Phase::StartUp, environment.time.startup_s)?;
     let answer = exchange.wait(&mut sent)?;
-    let actions = &env.simulator.competition().actions;
+    let actions = &environment.simulator.competition().actions;
     let ready =
         answer::parse_ready(&answer.bytes, actions).map_err(|fault| answer.to_error(fault))?;
     match stated_interpolation {

@@ -117,13 +117,17 @@ impl CpuSamples {
 
 impl CpuAccounting {
     /// Reads all counters as the start of a span; `None` if the host has none.
-    pub(crate) fn read_start(&self, threads: &TrackedThreads) -> Option<CpuReading> {
+    pub(crate) fn read_cpus(&self, threads: &TrackedThreads) -> Option<CpuReading> {
         self.read(ReadOrder::AgentFirst, threads)
     }
 
     /// Reads those counters that take only a few microseconds, as the start of a span; of threads, only the tracked ones. `None` if
     /// the host has no such counters, or counts in ticks only.
-    pub(crate) fn read_baseline(&self, threads: &TrackedThreads, stat: &str) -> Option<CpuReading> {
+    pub(crate) fn read_cpu_baseline(
+        &self,
+        threads: &TrackedThreads,
+        stat: &str,
+    ) -> Option<CpuReading> {
         let RunTimeFiles::PerCpu { all, .. } = &self.run_time else {
             return None;
         };

@@ -9,6 +9,7 @@ use crate::{
     cgroup::AgentCgroup,
     channel::Channel,
     child_setup::{ChildSetup, StepReport, rlimits},
+    dead_services::SCRATCH_PREFIX,
     error::IoContext,
     line_socket::LineSocket,
     owner::Owner,
@@ -18,7 +19,6 @@ use crate::{
     spawner,
     status_pipe::StatusPipe,
     stderr_log::StderrLog,
-    sweep::SCRATCH_PREFIX,
 };
 use faceoff_types::AgentFaultKind;
 use std::{

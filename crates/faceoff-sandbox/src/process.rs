@@ -5,6 +5,7 @@ use crate::{
     Isolation, Killer, Limits, ReadLine, SandboxError, SpawnError, SpawnSpec, WriteError,
     cgroup::AgentCgroup,
     command_check::check_command,
+    dead_services::remove_remains_of_dead_services,
     error::IoContext,
     exit_cause::{ExitCause, ExitReport},
     launch::{Launch, LaunchedAgent},
@@ -14,7 +15,6 @@ use crate::{
     process_tree::ProcessTree,
     status_pipe::StatusPipe,
     stderr_log::StderrLog,
-    sweep,
     thread_waits::TrackedThreads,
 };
 use faceoff_types::AgentFaultKind;
@@ -68,10 +68,10 @@ impl AgentProcess {
     /// [`SpawnError::Agent`] if the bundle's command cannot be started, [`SpawnError::Platform`] if the
     /// host lacks a layer that is not disabled, or the sandbox cannot be set up.
     pub fn spawn(spec: &SpawnSpec) -> Result<Self, SpawnError> {
-        static SWEEP: Once = Once::new();
+        static REMAINS_REMOVED: Once = Once::new();
         if matches!(spec.isolation, Isolation::Sandboxed { .. }) {
-            SWEEP.call_once(|| {
-                sweep::sweep_stale();
+            REMAINS_REMOVED.call_once(|| {
+                remove_remains_of_dead_services();
             });
         }
         let bundle_dir = fs::canonicalize(&spec.bundle_dir).context(format_args!(
@@ -286,9 +286,9 @@ impl AgentProcess {
     }
 
     /// Reads the counters of the agent's CPUs and threads; `None` without a cgroup.
-    pub fn sample_cpus(&self) -> Option<CpuReading> {
+    pub fn read_cpus(&self) -> Option<CpuReading> {
         let accounting = self.tree.cgroup.as_ref()?.cpu_accounting.as_ref()?;
-        accounting.read_start(&self.threads)
+        accounting.read_cpus(&self.threads)
     }
 
     /// Reads the counters before a question. `evaluator_cpus`: the CPUs of the calling thread (the evaluator's) if they are disjoint from
@@ -303,7 +303,8 @@ impl AgentProcess {
         };
         CounterBaseline {
             read_at: Instant::now(),
-            cpus: accounting.and_then(|accounting| accounting.read_baseline(&self.threads, &stat)),
+            cpus: accounting
+                .and_then(|accounting| accounting.read_cpu_baseline(&self.threads, &stat)),
             evaluator: evaluator_cpus
                 .map(|cpus| EvaluatorCounters::read(&stat, cpus, self.stderr.reader_run_time())),
         }
@@ -318,7 +319,7 @@ impl AgentProcess {
     /// Host interference since the question: the time in which the agent was runnable and could not run, because all
     /// its CPUs ran processes outside of its cgroup, or the hypervisor had stopped them.
     ///
-    /// It is measured since the first of `samples`, and since the `baseline` that was read before the question
+    /// It is measured since the first of `samples`, and since the `cpu_baseline` that was read before the question
     /// (`asked_at`). Without either it is zero; `None` if the host has no such counters. A thread's wait counts only if
     /// the thread then ran, unless the answer is still pending.
     ///
@@ -329,14 +330,14 @@ impl AgentProcess {
         &self,
         asked_at: Instant,
         samples: Option<&CpuSamples>,
-        baseline: Option<&CpuReading>,
+        cpu_baseline: Option<&CpuReading>,
         answer: AnswerState,
     ) -> Option<HostInterference> {
         let accounting = self.tree.cgroup.as_ref()?.cpu_accounting.as_ref()?;
-        if samples.is_none() && baseline.is_none() {
+        if samples.is_none() && cpu_baseline.is_none() {
             return Some(HostInterference::default());
         }
-        accounting.interference_since(asked_at, samples, baseline, &self.threads, answer)
+        accounting.interference_since(asked_at, samples, cpu_baseline, &self.threads, answer)
     }
 
     /// Ends the agent's input, waits up to `grace` for its exit, then kills the tree; always reaps it.

@@ -3,7 +3,7 @@
 
 use crate::{
     app::AppState,
-    boxed,
+    boxed_future,
     problem::{Problem, ProblemKind},
 };
 
@@ -11,7 +11,7 @@ use crate::{
 ///
 /// # Errors
 /// `Gone`.
-#[boxed]
+#[boxed_future]
 pub async fn check_included(app: &AppState, key: &str, artifact_kind: &str) -> Result<(), Problem> {
     if is_omitted(app, key).await? {
         return Err(Problem::new(
@@ -25,7 +25,7 @@ pub async fn check_included(app: &AppState, key: &str, artifact_kind: &str) -> R
 }
 
 /// Whether an artifact is missing because the archive does not contain it.
-#[boxed]
+#[boxed_future]
 pub async fn is_omitted(app: &AppState, key: &str) -> Result<bool, Problem> {
     // In the public edition of an archive the keys of all submissions are empty.
     Ok(app.store.archived_season().is_some()

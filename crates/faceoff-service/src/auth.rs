@@ -3,7 +3,7 @@
 
 use crate::{
     app::{App, AppState},
-    boxed,
+    boxed_future,
     change_quota::{self, RemainingChangesSlot},
     credential::Credential,
     priority_permits::Precedence,
@@ -214,7 +214,7 @@ impl TeamCaller {
 ///
 /// # Errors
 /// `Internal`: the database cannot be read.
-#[boxed]
+#[boxed_future]
 pub async fn session_caller(
     app: &AppState,
     headers: &HeaderMap,
@@ -229,7 +229,7 @@ pub async fn session_caller(
 ///
 /// # Errors
 /// `Internal`: the database cannot be read.
-#[boxed]
+#[boxed_future]
 pub async fn caller_with_session(app: &AppState, secret: &str) -> Result<Option<Caller>, Problem> {
     let secret_hash = hash_token(secret);
     let now = app.config.clock.now();
@@ -246,7 +246,7 @@ pub async fn caller_with_session(app: &AppState, secret: &str) -> Result<Option<
 #[derive(Debug, Clone)]
 pub struct SessionCaller(pub Caller);
 
-#[boxed]
+#[boxed_future]
 async fn authenticate(parts: &Parts, app: &App) -> Result<Option<Caller>, Problem> {
     let (token, kind) = match Credential::read(parts, &app.config)? {
         None => return Ok(None),

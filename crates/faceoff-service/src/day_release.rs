@@ -3,7 +3,7 @@
 
 use crate::{
     app::AppState,
-    boxed,
+    boxed_future,
     problem::{Problem, ProblemKind},
 };
 use faceoff_store::Evaluation;
@@ -12,7 +12,7 @@ use faceoff_store::Evaluation;
 ///
 /// # Errors
 /// `NotYet`, with the number of those evaluations.
-#[boxed]
+#[boxed_future]
 pub async fn check_released(app: &AppState, evaluation: &Evaluation) -> Result<(), Problem> {
     if evaluation.released_at.is_some() {
         return Ok(());

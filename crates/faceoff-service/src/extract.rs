@@ -2,7 +2,7 @@
 //! that names the wrong field.
 
 use crate::{
-    boxed,
+    boxed_future,
     problem::{Problem, ProblemKind},
     session,
 };
@@ -60,7 +60,7 @@ where
 }
 
 /// Whether the media type of the body is JSON, and the body.
-#[boxed]
+#[boxed_future]
 async fn read_body(request: Request) -> Result<(bool, Bytes), Problem> {
     let is_json = request
         .headers()
@@ -180,7 +180,7 @@ where
     }
 }
 
-#[boxed]
+#[boxed_future]
 async fn path_params(parts: &mut Parts) -> Result<Vec<String>, Problem> {
     let params = RawPathParams::from_request_parts(parts, &())
         .await

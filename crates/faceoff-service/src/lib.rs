@@ -49,6 +49,6 @@ mod upload_slots;
 pub mod viewer;
 pub mod views;
 
-/// `#[boxed]` on an `async fn` that other crates await makes it return a boxed future. Without it each of these crates would compile the
-/// body.
-pub(crate) use async_recursion::async_recursion as boxed;
+/// `#[boxed_future]` on an `async fn` that other crates await makes it return a boxed future. Without it each of these crates would
+/// compile the body.
+pub(crate) use async_recursion::async_recursion as boxed_future;

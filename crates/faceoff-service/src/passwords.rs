@@ -5,7 +5,7 @@
 //! user of that name. The delay also affects the user, whose tokens, sessions and links keep working meanwhile.
 
 use crate::{
-    boxed,
+    boxed_future,
     network::Network,
     problem::{Problem, ProblemKind},
 };
@@ -196,7 +196,7 @@ impl Passwords {
     }
 
     /// Hashes a new password. The result is a PHC string: algorithm, parameters, salt and hash in one text.
-    #[boxed]
+    #[boxed_future]
     pub async fn hash(&self, password: String, client: Option<Network>) -> Result<String, Problem> {
         check(&password)?;
         let place = self.take_place(client)?;
@@ -209,7 +209,7 @@ impl Passwords {
 
     /// Verifies a password for a name; returns the user if it is correct. `account` is the user of that name with the stored hash (PHC
     /// string), or `None`; then all takes the same time and has the same answers, so an attacker cannot find out names.
-    #[boxed]
+    #[boxed_future]
     pub async fn verify(
         &self,
         name: &str,

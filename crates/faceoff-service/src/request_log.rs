@@ -1,6 +1,6 @@
 //! Logging and metrics of HTTP requests.
 
-use crate::{app::AppState, boxed};
+use crate::{app::AppState, boxed_future};
 use axum::{
     extract::{MatchedPath, Request, State},
     http::{HeaderName, Method, StatusCode},
@@ -57,7 +57,7 @@ impl RequestKind {
 }
 
 /// Handles a request in a span with its id and, once it is authenticated, its actor.
-#[boxed]
+#[boxed_future]
 pub async fn log_request(
     State(app): State<Arc<AppState>>,
     request: Request,

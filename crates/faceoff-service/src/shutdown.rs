@@ -1,6 +1,6 @@
 //! Signal of the server's shutdown. Streaming responses (events, live games) have no end, so they wait for it and then end.
 
-use crate::boxed;
+use crate::boxed_future;
 use std::future::pending;
 use tokio::sync::watch;
 
@@ -16,7 +16,7 @@ impl Shutdown {
     }
 
     /// Waits for the shutdown; without a signal (`None`) forever.
-    #[boxed]
+    #[boxed_future]
     pub async fn wait(shutdown: Option<&mut Self>) {
         match shutdown {
             Some(Self(receiver)) => {

@@ -2,7 +2,7 @@
 //! condenses the outcomes of the episodes. The worker stores it when the run has ended; until then it is computed from the
 //! outcomes. It is kept in memory, so that a board or an ablation reads it once.
 
-use crate::{boxed, problem::Problem, shared_cache::SharedCache};
+use crate::{boxed_future, problem::Problem, shared_cache::SharedCache};
 use faceoff_scoring::EpisodeSummary;
 use faceoff_store::Store;
 use faceoff_types::{Competition, RunId};
@@ -32,14 +32,14 @@ impl Summaries {
     }
 
     /// The summary of one completed run.
-    #[boxed]
+    #[boxed_future]
     pub async fn load_run(&self, run: RunId) -> Result<Arc<EpisodeSummary>, Problem> {
         let summary = self.load(&[run]).await?.remove(&run);
         summary.ok_or_else(|| Problem::internal(format_args!("run {run} has no summary")))
     }
 
     /// The summaries of completed runs: one database read for those that are not in memory.
-    #[boxed]
+    #[boxed_future]
     pub async fn load(&self, runs: &[RunId]) -> Result<RunSummaries, Problem> {
         let mut summaries = RunSummaries::new();
         for run in runs {

@@ -1,7 +1,7 @@
 //! Time limit of request handlers.
 
 use crate::{
-    boxed,
+    boxed_future,
     problem::{Problem, ProblemKind},
 };
 use axum::{
@@ -12,7 +12,7 @@ use axum::{
 use std::time::Duration;
 
 /// Responds with `Busy` if a handler takes longer than `timeout`.
-#[boxed]
+#[boxed_future]
 pub async fn time_out(State(timeout): State<Duration>, request: Request, next: Next) -> Response {
     match tokio::time::timeout(timeout, next.run(request)).await {
         Ok(response) => response,

@@ -6,7 +6,7 @@
 //! A *folder* of artifacts is all that have a common key prefix, which ends before a slash.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
 };
 use bytes::Bytes;
@@ -76,7 +76,7 @@ impl Artifacts {
 
     /// Stores a copy of a file under `key`, replacing an earlier one. It appears whole or not at all,
     /// even if the process is killed.
-    #[boxed]
+    #[boxed_future]
     pub async fn put_file(&self, key: &str, file: &Path) -> Result<()> {
         let io_error = |error: std::io::Error| StoreError::artifact(file.display(), &error);
         let mut source = tokio::fs::File::open(file).await.map_err(io_error)?;
@@ -105,7 +105,7 @@ impl Artifacts {
     }
 
     /// Stores bytes under `key`, replacing an earlier artifact; they appear whole or not at all.
-    #[boxed]
+    #[boxed_future]
     pub async fn put_bytes(&self, key: &str, bytes: Vec<u8>) -> Result<()> {
         let key = parse_key(key)?;
         let put = self.objects.put(&key, bytes.into());
@@ -114,7 +114,7 @@ impl Artifacts {
     }
 
     /// Stores a dataset, and before it the clips for its replays, so that a stored dataset always has them.
-    #[boxed]
+    #[boxed_future]
     pub async fn put_dataset(&self, key: &str, archive: &Path, clips: Option<&Path>) -> Result<()> {
         if let Some(clips) = clips {
             self.put_file(&Self::clips_key(key), clips).await?;
@@ -129,7 +129,7 @@ impl Artifacts {
     }
 
     /// Removes a dataset and its clips. Missing ones are no error.
-    #[boxed]
+    #[boxed_future]
     pub async fn delete_dataset(&self, key: &str) -> Result<()> {
         self.delete(&Self::clips_key(key)).await?;
         self.delete(key).await
@@ -162,7 +162,7 @@ impl Artifacts {
     }
 
     /// The ablations that have parts (clips of shards).
-    #[boxed]
+    #[boxed_future]
     pub async fn ablations_with_parts(&self) -> Result<Vec<AblationId>> {
         let folder = parse_key(ABLATION_PARTS_PREFIX)?;
         let listing = self.objects.list_with_delimiter(Some(&folder));
@@ -174,7 +174,7 @@ impl Artifacts {
     }
 
     /// The parts (clips of shards) of an ablation, in any order.
-    #[boxed]
+    #[boxed_future]
     pub async fn list_ablation_parts(&self, id: AblationId) -> Result<Vec<AblationPart>> {
         let folder = parse_key(&Self::ablation_parts_prefix(id))?;
         let listing = self.objects.list_with_delimiter(Some(&folder));
@@ -192,7 +192,7 @@ impl Artifacts {
     }
 
     /// Copies an artifact to a new file and flushes it to disk.
-    #[boxed]
+    #[boxed_future]
     pub async fn get_to_file(&self, key: &str, file: &Path) -> Result<()> {
         let (bytes, mut stream) = self.read(key).await?;
         let io_error = |error: std::io::Error| StoreError::artifact(file.display(), &error);
@@ -221,7 +221,7 @@ impl Artifacts {
     }
 
     /// Length of an artifact, in bytes; `None` if it does not exist.
-    #[boxed]
+    #[boxed_future]
     pub async fn size_bytes(&self, key: &str) -> Result<Option<u64>> {
         match self.objects.head(&parse_key(key)?).await {
             Ok(object) => Ok(Some(object.size)),
@@ -231,7 +231,7 @@ impl Artifacts {
     }
 
     /// Length and bytes of an artifact, for a download.
-    #[boxed]
+    #[boxed_future]
     pub async fn read(&self, key: &str) -> Result<(u64, ArtifactStream)> {
         let object = self
             .objects
@@ -243,7 +243,7 @@ impl Artifacts {
     }
 
     /// A range of an artifact's bytes, for a download. Only these are read.
-    #[boxed]
+    #[boxed_future]
     pub async fn read_range(&self, key: &str, range: Range<u64>) -> Result<ArtifactStream> {
         let options = GetOptions::new().with_range(Some(range));
         let object = self
@@ -255,7 +255,7 @@ impl Artifacts {
     }
 
     /// Removes an artifact; one that does not exist is no error, so that a removal can be repeated.
-    #[boxed]
+    #[boxed_future]
     pub async fn delete(&self, key: &str) -> Result<()> {
         match self.objects.delete(&parse_key(key)?).await {
             Ok(()) | Err(object_store::Error::NotFound { .. }) => Ok(()),
@@ -264,7 +264,7 @@ impl Artifacts {
     }
 
     /// Stores every file directly in `folder` as `prefix/NAME`.
-    #[boxed]
+    #[boxed_future]
     pub async fn put_folder(&self, prefix: &str, folder: &Path) -> Result<()> {
         let io_error = |error: std::io::Error| StoreError::artifact(folder.display(), &error);
         let mut entries = tokio::fs::read_dir(folder).await.map_err(io_error)?;
@@ -280,7 +280,7 @@ impl Artifacts {
     }
 
     /// Copies every artifact `prefix/NAME` to `folder/NAME`. [`StoreError::NotFound`] if none exists.
-    #[boxed]
+    #[boxed_future]
     pub async fn get_folder(&self, prefix: &str, folder: &Path) -> Result<()> {
         let listing = self
             .objects
@@ -313,14 +313,14 @@ impl Artifacts {
     }
 
     /// Removes every artifact under `prefix/`.
-    #[boxed]
+    #[boxed_future]
     pub async fn delete_folder(&self, prefix: &str) -> Result<()> {
         self.delete_others(prefix, "").await
     }
 
     /// Removes every artifact under `prefix/` except the one with the key `kept_key`, those under `kept_key/`, and the
     /// clips of the dataset `kept_key`.
-    #[boxed]
+    #[boxed_future]
     pub async fn delete_others(&self, prefix: &str, kept_key: &str) -> Result<()> {
         let listing: Vec<_> = self
             .objects
@@ -347,7 +347,7 @@ impl Artifacts {
 
     /// Removes incomplete files that a killed process has left, if they were started before `before`.
     /// Returns the number of files.
-    #[boxed]
+    #[boxed_future]
     pub async fn remove_abandoned(&self, before: Timestamp) -> Result<usize> {
         let folder = Arc::clone(&self.folder);
         tokio::task::spawn_blocking(move || remove_incomplete(&folder, before.into()))

@@ -1,7 +1,7 @@
 //! Health of the database and of the queue, for monitoring.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::Result,
     queue::{self, QueueGauges},
     store::Store,
@@ -71,7 +71,7 @@ impl Store {
     }
 
     /// Health of the store. The write probe changes no data.
-    #[boxed]
+    #[boxed_future]
     pub async fn health(&self, now: Timestamp) -> Health {
         Health {
             database_writable: self.is_writable(now).await,

@@ -44,9 +44,10 @@ mod tables;
 mod write;
 mod write_ahead_log;
 
-/// `#[boxed]` on a public `async fn` makes it return a boxed future. Each crate that awaits an `async fn` compiles its body; boxed, only the store
-/// does. This saves the server, the workers and every test from compiling it. A call costs one allocation.
-pub(crate) use async_recursion::async_recursion as boxed;
+/// `#[boxed_future]` on a public `async fn` makes it return a boxed future. Each crate that awaits an `async fn` compiles its body; if
+/// the future is boxed, only the store does. This saves the server, the workers and every test from compiling it. A call costs one
+/// allocation.
+pub(crate) use async_recursion::async_recursion as boxed_future;
 
 pub use artifacts::{AblationPart, ArtifactStream, Artifacts};
 pub use error::StoreError;

@@ -1,7 +1,7 @@
 //! [`Store`]: the handle through which all other crates use this one.
 
 use crate::{
-    artifacts::Artifacts, boxed, database::Database, error::Result, event::Change,
+    artifacts::Artifacts, boxed_future, database::Database, error::Result, event::Change,
     free_space::FreeSpace, health_probes::HealthProbes, schema::Upgrade, signals::Signals,
     tables::archive::ArchivedSeason,
 };
@@ -53,7 +53,7 @@ impl Store {
 
     /// Copies the write-ahead log into the database, as far as possible without blocking. Run it
     /// periodically; a log that grows too long is emptied without it.
-    #[boxed]
+    #[boxed_future]
     pub async fn checkpoint(&self) -> Result<()> {
         self.database.checkpoint().await
     }
@@ -96,7 +96,7 @@ impl Store {
 
     /// Waits for running queries and closes the database. Dropping the handle is as safe, but does
     /// not wait.
-    #[boxed]
+    #[boxed_future]
     pub async fn close(&self) {
         self.database.close().await;
     }

@@ -82,7 +82,7 @@ pub async fn change_rules(
     now: Timestamp,
     change: impl FnOnce(&mut StageRules),
 ) -> Result<Stage, StoreError> {
-    let mut rules = store.stage(stage).await?.rules.rules;
+    let mut rules = store.stage(stage).await?.revision.rules;
     change(&mut rules);
     let change = StageChange {
         rules: Some(rules),

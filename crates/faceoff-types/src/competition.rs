@@ -100,7 +100,7 @@ pub struct ViolationInfo {
     /// Its name in lists, such as "end effector".
     pub title: String,
     /// The heading of its columns, such as "joint position".
-    pub column: String,
+    pub column_heading: String,
     /// The heading of its columns in a terminal, of at most four letters.
     pub short: String,
     /// What has happened, such as "end effector out of bounds".

@@ -10,7 +10,8 @@ pub trait DeprecatedNames {
     const DEPRECATED_NAMES: &'static [(&'static str, &'static str)];
 }
 
-/// Implements `Serialize` and `Deserialize` for a type with renamed fields, as `Type { old => new }`.
+/// Implements `Serialize` and `Deserialize` for a type with renamed fields, given as `Type { old => new }`; JSON has
+/// both.
 ///
 /// The type derives both traits with `#[serde(remote = "Self")]`, by which serde generates functions of the type instead of the traits.
 /// The macro implements the traits with these functions, and adds the old names. Renamed fields of an enum's variants are listed

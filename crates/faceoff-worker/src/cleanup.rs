@@ -1,6 +1,6 @@
 //! Periodic removal of data that is no longer needed, and periodic storing of derived data.
 
-use crate::{ablation_clips, boxed, episode_summaries};
+use crate::{ablation_clips, boxed_future, episode_summaries};
 use faceoff_scoring::EpisodeSummary;
 use faceoff_store::{Store, StoreError};
 use faceoff_types::{Clock, Competition};
@@ -15,7 +15,7 @@ const LONGEST_WRITE: SignedDuration = SignedDuration::from_hours(1);
 /// missing: episode summaries, the joined clips of ablations, and sizes of datasets. Keeps the database's write-ahead log short.
 ///
 /// Failures are logged, and retried by the next call.
-#[boxed]
+#[boxed_future]
 pub async fn clean_up(store: &Store, competition: &Arc<Competition>, clock: &Clock) {
     let now = clock.now();
     if let Err(error) = store.remove_old_recordings(now).await {

@@ -1,7 +1,7 @@
 //! Episode summaries, which boards and comparisons read in place of single outcomes. They are stored as soon as an
 //! evaluation is scored or an ablation has ended, so that no page computes and stores them.
 
-use crate::boxed;
+use crate::boxed_future;
 use faceoff_scoring::EpisodeSummary;
 use faceoff_store::Store;
 use faceoff_types::{Competition, RunId};
@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 /// Stores the summaries of all ended runs that have none in the current format. A *run* is the episodes of a submission under
 /// one plan. Failures are logged, and retried by the next call; until then readers compute the summary themselves.
-#[boxed]
+#[boxed_future]
 pub(crate) async fn store_missing(store: &Store, competition: &Arc<Competition>, now: Timestamp) {
     let missing = match store.unsummarised_runs(EpisodeSummary::VERSION).await {
         Ok(runs) => runs,

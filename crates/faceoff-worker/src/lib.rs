@@ -35,9 +35,9 @@ mod slot_threads;
 #[cfg(test)]
 mod tests;
 
-/// `#[boxed]` on a public `async fn` makes it return a boxed future, so that its body is compiled once, here, and not in each crate
-/// that awaits it.
-pub(crate) use async_recursion::async_recursion as boxed;
+/// `#[boxed_future]` on a public `async fn` makes it return a boxed future, so that its body is compiled once, here, and not in each
+/// crate that awaits it.
+pub(crate) use async_recursion::async_recursion as boxed_future;
 
 pub use cleanup::clean_up;
 pub use cpus::{CpuLayout, SlotCpus};

@@ -1,7 +1,7 @@
 //! The daily schedule. At a stage's *cutoff* its submissions are frozen, and the evaluations of that *day* start. A day whose
 //! deadline has passed is ended.
 
-use crate::boxed;
+use crate::boxed_future;
 use anyhow::Context as _;
 use faceoff_store::{Actor, Evaluation, RunPlan, Stage, Store};
 use faceoff_types::{Clock, Competition, Profile, StepCause};
@@ -17,7 +17,7 @@ const LONGEST_SLEEP: Duration = Duration::from_secs(1);
 /// Ends days whose deadline has passed and starts scheduled days at their cutoffs, each once, until `shutdown` is
 /// cancelled. A day that became due while the server was down starts when the server is up again, if the date is still
 /// the same. After a database error it tries again every second.
-#[boxed]
+#[boxed_future]
 pub async fn run_schedule(
     store: Store,
     competition: Arc<Competition>,
@@ -71,7 +71,7 @@ pub(crate) async fn update_due_days_unless_behind(
 
 /// Ends and starts all days that are due at `now`, and returns the time of the next start, if any. [`run_schedule`]
 /// calls it at the right times.
-#[boxed]
+#[boxed_future]
 pub async fn update_due_days(
     store: &Store,
     competition: &Competition,

@@ -2,7 +2,7 @@
 //! configuration.
 
 use crate::{
-    boxed,
+    boxed_future,
     bundle_cache::BundleCache,
     cleanup,
     cpus::{self, CpuLayout},
@@ -85,7 +85,7 @@ pub struct SlotsConfig {
 /// Runs a named thread per slot (`faceoff-slot-0` …) until `shutdown` is cancelled. On shutdown all jobs are released at
 /// once; the threads are given 20 s to end, since an agent may be in the middle of an answer. Fails if the scratch folder
 /// cannot be locked or a slot dies.
-#[boxed]
+#[boxed_future]
 pub async fn run(
     store: Store,
     live: LiveState,

@@ -14,10 +14,11 @@ use futures::StreamExt as _;
 use std::{thread, time::Duration};
 use tokio::runtime::Runtime;
 
-/// Numbers of slots: in the server (0 or 1), and in each worker.
 struct Setup {
     name: &'static str,
-    server_slots: usize,
+    /// The server has one slot. It always validates and scores; it also runs shards if this is set.
+    server_runs_shards: bool,
+    /// The number of slots of each worker.
     worker_slots: &'static [usize],
 }
 
@@ -29,22 +30,22 @@ fn remote_results_equal_local_results() {
     let setups = [
         Setup {
             name: "one-worker",
-            server_slots: 0,
+            server_runs_shards: false,
             worker_slots: &[1],
         },
         Setup {
             name: "one-worker-with-two-slots",
-            server_slots: 0,
+            server_runs_shards: false,
             worker_slots: &[2],
         },
         Setup {
             name: "two-workers-and-server",
-            server_slots: 1,
+            server_runs_shards: true,
             worker_slots: &[1, 1],
         },
         Setup {
             name: "four-workers",
-            server_slots: 0,
+            server_runs_shards: false,
             worker_slots: &[1, 1, 1, 1],
         },
     ];
@@ -58,7 +59,8 @@ fn remote_results_equal_local_results() {
             config.replace("[nats]", &format!("[nats]\nname = \"{}\"", setup.name))
         };
         let mut config = many_shards(&with_name(server_config(&nats, file_relay.address())));
-        if setup.server_slots > 0 {
+        if setup.server_runs_shards {
+            // `play`: whether the server's own slot runs shards and games.
             config = config.replace("play = false", "play = true");
         }
         let server = Server::start(&data_dir, &config);
@@ -90,8 +92,7 @@ fn remote_results_equal_local_results() {
             .lines()
             .any(|line| line.contains("committed") && line.contains(" episodes "));
         assert_eq!(
-            has_local_episodes,
-            setup.server_slots > 0,
+            has_local_episodes, setup.server_runs_shards,
             "{}:\n{log}",
             setup.name
         );

@@ -66,9 +66,11 @@ pub enum ProposalKindView {
 #[serde(rename_all = "snake_case")]
 pub enum ProposalStateView {
     /// Evaluations are pending or running.
-    Playing,
+    #[serde(rename = "playing")]
+    Running,
     /// All evaluations have ended; an organiser applies or drops the proposal.
-    Played,
+    #[serde(rename = "played")]
+    Finished,
     /// Its evaluations count.
     Applied,
     /// Its evaluations never count.

@@ -143,12 +143,12 @@ impl Season {
         site.change_first_stage(more_faults).await.json(200);
         site.next_day();
         site.start_day().await;
-        site.run_shards(10).await;
+        site.run_shards_with_faults(10).await;
         site.run_evaluation(|task, episode| outcome(task, episode, task == HIT && episode == 0))
             .await;
         site.next_day();
         site.start_day().await;
-        site.run_shards(10).await;
+        site.run_shards_with_faults(10).await;
         let today = site.get("/api/v1/evaluations", Some(ADMIN)).await.json(200);
         let open = today
             .as_array()

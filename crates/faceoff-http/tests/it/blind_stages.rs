@@ -225,7 +225,7 @@ async fn blind_results_are_visible_to_organisers_only() {
 async fn faults_of_a_blind_stage_are_hidden() {
     let site = Site::start().await;
     let ([alpha, _], [alpha_evaluation, _]) = blind_day(&site).await;
-    site.run_shards(2).await;
+    site.run_shards_with_faults(2).await;
     site.finish_evaluation(&result([0.1, 0.2, 0.3], 10.0)).await;
     let team_view = site
         .get(&alpha_evaluation, Some(&alpha.token))

@@ -169,6 +169,7 @@ async fn only_organisers_accept_a_clock_step() {
 async fn server_start_before_newest_change_is_reported() {
     let site = Site::start_with_schedule("06:00").await;
     let start = ClockStart {
+        // No earlier process of this boot has recorded when its monotonic clock was zero.
         zero_at: None,
         newest_change_at: Some(site.now() + SignedDuration::from_hours(1)),
     };

@@ -117,7 +117,7 @@ async fn single_evaluation_cannot_be_started() {
 async fn failed_evaluation_shows_its_faults_and_log() {
     let site = Site::start().await;
     let (team, _, path) = site.team_with_evaluation("Alpha", "striker").await;
-    site.run_shards(2).await;
+    site.run_shards_with_faults(2).await;
     let failed = site.get(&path, Some(&team.token)).await.json(200);
     assert_eq!(failed["state"], "agent_failed", "{failed:#}");
     let fault = &failed["faults"][0];

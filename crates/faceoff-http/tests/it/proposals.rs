@@ -428,7 +428,7 @@ async fn proposal_datasets_are_for_organisers_until_dropped() {
         .await
         .problem(409, "conflict", &["has not finished", &proposal]);
     site.run_evaluation(solve_first(1)).await;
-    site.run_shards(4).await;
+    site.run_shards_with_faults(4).await;
 
     let view = site.get(&proposal, Some(ADMIN)).await.json(200);
     let finished = &view["evaluations"][0];
@@ -450,7 +450,7 @@ async fn proposal_datasets_are_for_organisers_until_dropped() {
     site.get(&second, Some(ADMIN))
         .await
         .problem(409, "conflict", &["too many faults"]);
-    // Other teams get 404, even the team of the submission.
+    // No team may download it, not even the team of the submission.
     let alpha = string(&view["evaluations"][0]["team"]);
     let token = format!("/api/v1/teams/{alpha}/token");
     let token = post(&site, &token, json!({})).await.json(200);

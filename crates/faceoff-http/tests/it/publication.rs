@@ -155,7 +155,7 @@ async fn public_failed_evaluation_hides_faults_and_log() {
         .json(200);
     let path = site.start_evaluation(&team, &submission).await;
     // The plan of the run allows one agent fault, so two stop the evaluation.
-    site.run_shards(2).await;
+    site.run_shards_with_faults(2).await;
     let team_view = site.get(&path, Some(&team.token)).await.json(200);
     assert!(team_view["log"].as_str().unwrap().contains("log of"));
     let public_view = site.get(&path, None).await.json(200);

@@ -147,7 +147,7 @@ async fn faults_log_and_comparison_appear_with_the_release() {
         panic!("three evaluations")
     };
     // The plan of the run allows one agent fault, so two stop the first evaluation.
-    site.run_shards(2).await;
+    site.run_shards_with_faults(2).await;
     site.finish_evaluation(&result([0.5, 0.6, 0.7], 100.0))
         .await;
     let compare = format!("{early}/compare/{}", late.rsplit('/').next().unwrap());

@@ -568,7 +568,7 @@ impl Site {
 
     /// Runs the shards of the next evaluation (one of each task), with `faults` agent faults in each. The plan allows one fault, so with
     /// more the first shard ends the evaluation as failed.
-    pub async fn run_shards(&self, faults: usize) {
+    pub async fn run_shards_with_faults(&self, faults: usize) {
         for _ in TASKS {
             let (claim, run, shard) = self.claim_shard().await;
             let outcomes = shard_outcomes(&shard, |task, episode| {
@@ -591,7 +591,7 @@ impl Site {
 
     /// Runs the next evaluation without faults and commits this result.
     pub async fn finish_evaluation(&self, result: &EvaluationResult) {
-        self.run_shards(0).await;
+        self.run_shards_with_faults(0).await;
         let ClaimedJob { claim, job } = self.claim().await;
         let Job::Scoring { evaluation, .. } = job else {
             panic!("expected a scoring job");

@@ -200,7 +200,8 @@ async fn worker_is_banned_and_readmitted_on_page_and_in_the_api() {
             &bans[0]["reason"],
             &bans[0]["evaluations"]
         ),
-        (&json!("rack-1"), &json!(reason), &json!([]))
+        (&json!("rack-1"), &json!(reason), &json!([])),
+        "no evaluation that counts has a part that the worker ran"
     );
 
     let post = async |path: &str, body: Value| {

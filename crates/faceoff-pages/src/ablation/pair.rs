@@ -3,7 +3,7 @@
 
 use crate::{
     assets,
-    frame::{Frame, PageProblem, render},
+    frame::{Frame, NO_ENTRY, PageProblem, render},
     side_by_side::{Side, neighbours},
 };
 use askama::Template;
@@ -74,7 +74,7 @@ pub(crate) async fn page(
     let submission = submission::find(&app, id).await?;
     let team = team::find(&app, submission.team).await?;
     render(&Page {
-        frame: Frame::load(&app, "").await?,
+        frame: Frame::load(&app, NO_ENTRY).await?,
         id,
         team: team.name.to_string(),
         profile,

@@ -7,7 +7,7 @@ use super::{
 use crate::{
     assets,
     embeddable::Embeddable,
-    frame::{Frame, PageProblem, render},
+    frame::{Frame, NO_ENTRY, PageProblem, render},
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
@@ -53,7 +53,7 @@ pub(crate) async fn page(State(app): State<App>) -> Result<Response, PageProblem
     }
     groups.retain(|group| !group.rows.is_empty());
     let mut response = render(&Page {
-        frame: Frame::without_season(""),
+        frame: Frame::without_season(NO_ENTRY),
         style: assets::FRONT_STYLE.url(),
         title: competition.title.clone(),
         stage: board.stage_name.to_string(),

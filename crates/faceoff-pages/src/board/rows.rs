@@ -281,7 +281,7 @@ impl TaskDetails {
         let kinds = competition.violations.iter();
         Some(Self {
             violations: kinds
-                .map(|info| (info.column.clone(), counts.get(info.name)))
+                .map(|info| (info.column_heading.clone(), counts.get(info.name)))
                 .collect(),
             mean_ms: format::milliseconds(time.mean),
             p99_ms: format::milliseconds(time.p99),

@@ -2,7 +2,7 @@
 
 use crate::{
     assets,
-    frame::{Frame, PageProblem, render},
+    frame::{Frame, NO_ENTRY, PageProblem, render},
     replay::page_path,
     side_by_side::{Side, neighbours},
 };
@@ -64,7 +64,7 @@ pub(crate) async fn page(
     let [previous_difference, next_difference] =
         solved.map_or([None; 2], |solved| differing_neighbours(solved, episode));
     render(&Page {
-        frame: Frame::load(&app, "").await?,
+        frame: Frame::load(&app, NO_ENTRY).await?,
         ids,
         task,
         episode,

@@ -4,7 +4,7 @@ use crate::{
     dashboard_frame::{
         DashboardHeader, DoneQuery, EmptyForm, Notice, redirect_done, render_dashboard,
     },
-    frame::{Frame, PageProblem},
+    frame::{Frame, NO_ENTRY, PageProblem},
     page_auth::PageMember,
     submission_row::SubmissionRow,
 };
@@ -75,7 +75,7 @@ fn violations_text(timing: &ValidationTiming, competition: &Competition) -> Stri
     }
     let limits = timing.violations.iter().map(|violated| {
         let info = competition.violation(violated.limit);
-        let name = info.map_or(violated.limit.as_str(), |info| info.column.as_str());
+        let name = info.map_or(violated.limit.as_str(), |info| info.column_heading.as_str());
         format!(
             "{name} in {} of {} episodes",
             violated.episodes, timing.episodes
@@ -109,8 +109,8 @@ async fn page_with(
         note: view.note.clone().unwrap_or_default(),
     });
     let page = Page {
-        frame: Frame::load(app, "").await?,
-        head: DashboardHeader::new(&member.caller, "", notice),
+        frame: Frame::load(app, NO_ENTRY).await?,
+        head: DashboardHeader::new(&member.caller, NO_ENTRY, notice),
         submission: SubmissionRow::from(&view),
         log: log.filter(|log| !log.trim().is_empty()),
         timing: view

@@ -4,7 +4,7 @@
 use crate::{
     assets,
     embeddable::Embeddable,
-    frame::{Frame, PageProblem, render},
+    frame::{Frame, NO_ENTRY, PageProblem, render},
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
@@ -75,7 +75,7 @@ pub(crate) async fn embedded(
     let clips = GameClips::find(&app, Viewer::Visitor, id).await?;
     let analysis = clips.analysis(&app, result.steps).await?;
     let mut response = render(&EmbeddedPage {
-        frame: Frame::without_season(""),
+        frame: Frame::without_season(NO_ENTRY),
         id,
         replay: GameReplay {
             observed_url: None,

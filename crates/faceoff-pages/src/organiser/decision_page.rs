@@ -3,7 +3,7 @@
 use super::decision::{Decision, DecisionPreview};
 use crate::{
     dashboard_frame::{DashboardHeader, Notice, redirect_done, render_dashboard},
-    frame::{Frame, PageProblem},
+    frame::{Frame, NO_ENTRY, PageProblem},
     page_auth::PageOrganiser,
 };
 use askama::Template;
@@ -34,8 +34,8 @@ async fn page_with(
 ) -> Result<Response, PageProblem> {
     let preview = decision.preview(app).await?;
     let page = Page {
-        frame: Frame::load(app, "").await?,
-        head: DashboardHeader::new(&user.caller, "", notice),
+        frame: Frame::load(app, NO_ENTRY).await?,
+        head: DashboardHeader::new(&user.caller, NO_ENTRY, notice),
         preview,
         reason,
     };

@@ -3,7 +3,7 @@
 use super::stage_form::{InputKind, StageForm};
 use crate::{
     dashboard_frame::{DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
-    frame::{Frame, PageProblem},
+    frame::{Frame, NO_ENTRY, PageProblem},
     page_auth::PageOrganiser,
 };
 use askama::Template;
@@ -55,7 +55,7 @@ async fn page_with(
     let needs_confirmation =
         matches!(notice, Notice::Refused(problem) if problem.kind() == ProblemKind::NotConfirmed);
     let page = Page {
-        frame: Frame::load(app, "").await?,
+        frame: Frame::load(app, NO_ENTRY).await?,
         head: DashboardHeader::new(&user.caller, "/organiser/stages", notice),
         form,
         task_checkboxes: StageForm::task_checkboxes(app.config.competition()),

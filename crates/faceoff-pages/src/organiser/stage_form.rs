@@ -26,7 +26,7 @@ impl StageForm {
     /// The current settings of a stage.
     pub(super) fn from_stage(stage: &Stage) -> Self {
         let texts = inputs().map(|input| (input.name.to_owned(), (input.text)(stage)));
-        let tasks = stage.rules.rules.tasks.iter();
+        let tasks = stage.revision.rules.tasks.iter();
         let tasks = tasks.map(|task| (task_checkbox(*task), "on".to_owned()));
         Self(texts.chain(tasks).collect())
     }

@@ -3,7 +3,7 @@
 use super::{form_lines, tournaments::PATH};
 use crate::{
     dashboard_frame::{DashboardHeader, DoneQuery, Notice, redirect_done, render_dashboard},
-    frame::{Frame, PageProblem},
+    frame::{Frame, NO_ENTRY, PageProblem},
     game_row::{GameRow, GameState, ResultDisplay},
     page_auth::PageOrganiser,
     tournament_text,
@@ -104,7 +104,7 @@ async fn page_with(
     let progress = tournament::progress(&state);
     let teams = view.entrants.iter();
     let page = Page {
-        frame: Frame::load(app, "").await?,
+        frame: Frame::load(app, NO_ENTRY).await?,
         head: DashboardHeader::new(&user.caller, PATH, notice),
         phase: tournament_text::phase_label(&view.summary),
         format: tournament_text::describe_format(&view.rules),

@@ -106,7 +106,7 @@ pub(crate) async fn collect(app: &App, edition: Edition) -> Result<PreparedArchi
         Edition::Organiser => Viewer::Organiser,
     };
     let mut artifacts = results::collect(&snapshot_state, viewer, &mut files).await?;
-    results::put_questions(&snapshot_state, edition, &mut files).await?;
+    results::put_team_questions(&snapshot_state, edition, &mut files).await?;
     events::put(&snapshot_state, &mut files).await?;
     drop(snapshot_state);
 

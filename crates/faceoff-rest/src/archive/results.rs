@@ -161,7 +161,7 @@ async fn put_boards(
             board_csv::board_table(app.config.competition(), &newest).into_bytes(CsvFormat::Csv),
         )
         .await?;
-    for task in &stage.rules.rules.tasks {
+    for task in &stage.revision.rules.tasks {
         let board = board::query(app, visibility, query(None), Some(*task)).await?;
         files
             .put_json(&format!("{folder}/board-{task}.json"), &board)
@@ -243,9 +243,9 @@ async fn day_datasets(
     Ok(datasets)
 }
 
-/// Adds the questions with their answers: the organiser's edition contains all, the public one those with a public answer.
+/// Adds the questions of teams with their answers: the organiser's edition contains all, the public one those with a public answer.
 /// The database of the public edition has no questions, because each row names the asking team.
-pub(super) async fn put_questions(
+pub(super) async fn put_team_questions(
     app: &AppState,
     edition: Edition,
     files: &mut Files,

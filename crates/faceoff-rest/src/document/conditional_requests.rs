@@ -12,10 +12,10 @@ use utoipa::{
 const IF_NONE_MATCH: &str = "If-None-Match";
 const RANGE: &str = "Range";
 
-/// Request headers of a route whose response has a tag (`ETag`).
-pub(crate) struct TagHeader;
+/// Request header `If-None-Match` of a route whose response has an `ETag`.
+pub(crate) struct IfNoneMatchHeader;
 
-impl IntoParams for TagHeader {
+impl IntoParams for IfNoneMatchHeader {
     fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
         let description = "tags (`ETag`) that the client already has; if the response has one of them, it is 304 without a body";
         vec![header(IF_NONE_MATCH, description)]
@@ -27,7 +27,7 @@ pub(crate) struct FileHeaders;
 
 impl IntoParams for FileHeaders {
     fn into_params(parameter_in: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
-        let mut params = TagHeader::into_params(parameter_in);
+        let mut params = IfNoneMatchHeader::into_params(parameter_in);
         let description = "`bytes=FIRST-LAST`, `bytes=FIRST-` or `bytes=-LENGTH`; the response is 206 with this range. Several \
                            ranges and malformed ones return the whole file";
         params.push(header(RANGE, description));

@@ -14,7 +14,7 @@ pub(super) const LEAF_PREFIX: &str = "agent-";
 static NEXT_NUMBER: AtomicU64 = AtomicU64::new(0);
 
 /// Kills the processes of `leaf`, waits for their end and removes the folder. The last leaf also removes its parent
-/// folder. A leaf that cannot be removed is logged and left for [`sweep`](super::sweep) at the next start.
+/// folder. A leaf that cannot be removed is logged and left for [`remove_stale_leaves`](super::remove_stale_leaves) at the next start.
 pub(super) fn remove_leaf(leaf: &Path) {
     /// Ample: the kernel releases a dead process's cgroup shortly after the parent has reaped the process.
     const TIMEOUT: Duration = Duration::from_secs(60);

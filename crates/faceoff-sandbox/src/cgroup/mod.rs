@@ -13,7 +13,7 @@ mod stale_leaves;
 
 pub(crate) use agent::{AgentCgroup, ExceededLimit};
 pub(crate) use leaf::kill_and_thaw;
-pub(crate) use stale_leaves::sweep;
+pub(crate) use stale_leaves::remove_stale_leaves;
 
 /// Beginning of the error if a controller cannot be reached at all; its name follows.
 pub(crate) const NOT_MOUNTED: &str = "no mounted cgroup hierarchy has the controller";

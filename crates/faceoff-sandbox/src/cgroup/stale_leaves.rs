@@ -8,7 +8,7 @@ use crate::owner::Owner;
 use std::{collections::BTreeSet, fs, path::PathBuf};
 
 /// Removes the cgroups of agents whose service is dead, and kills their processes; returns the number of cgroups.
-pub(crate) fn sweep() -> usize {
+pub(crate) fn remove_stale_leaves() -> usize {
     let Ok(hierarchies) = Hierarchies::read() else {
         return 0;
     };

@@ -91,7 +91,7 @@ fn perform(call: Call, agent: &mut AgentProcess) {
             agent.track_threads();
             drop((
                 agent.read_baseline(Some(&[0])),
-                agent.sample_cpus(),
+                agent.read_cpus(),
                 agent.cpu_time_s(),
             ));
         }

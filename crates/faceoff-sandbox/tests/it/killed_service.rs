@@ -2,7 +2,7 @@
 //! remains.
 
 use crate::harness::{Subject, TIMEOUT, agent_cgroups, expect_line, processes_marked};
-use faceoff_sandbox::{AgentProcess, sweep_stale};
+use faceoff_sandbox::{AgentProcess, remove_remains_of_dead_services};
 use rustix::{
     event::{PollFd, PollFlags, Timespec, poll},
     process::{Pid, PidfdFlags, pidfd_open},
@@ -12,7 +12,7 @@ use std::{
     process::{Command, Stdio},
 };
 
-/// In cgroup version 1 a frozen process does not die, so the sweep must thaw it.
+/// In cgroup version 1 a frozen process does not die, so the removal must thaw it.
 #[test]
 fn frozen_agent_of_a_killed_service_is_removed() {
     assert_ends_with_its_service("killed_service::service_waits_with_a_frozen_agent", true);
@@ -23,9 +23,9 @@ fn agent_of_a_killed_service_dies_with_its_cgroup() {
     assert_ends_with_its_service("killed_service::service_waits_with_an_agent", false);
 }
 
-/// Starts the ignored test `service` in a child process, kills it, and checks that its agent ends. `needs_sweep`: the agent ends only by
-/// the sweep that the next service makes at its start.
-fn assert_ends_with_its_service(service: &str, needs_sweep: bool) {
+/// Starts the ignored test `service` in a child process, kills it, and checks that its agent ends. `needs_removal`: the agent ends only
+/// when the next service, at its start, removes the remains of dead ones.
+fn assert_ends_with_its_service(service: &str, needs_removal: bool) {
     let mut service = Command::new(std::env::current_exe().unwrap())
         .args(["--exact", service, "--ignored", "--nocapture"])
         .stdin(Stdio::piped())
@@ -52,8 +52,8 @@ fn assert_ends_with_its_service(service: &str, needs_sweep: bool) {
 
     service.kill().unwrap();
     service.wait().unwrap();
-    if needs_sweep {
-        sweep_stale();
+    if needs_removal {
+        remove_remains_of_dead_services();
     }
     let timeout = Timespec {
         tv_sec: TIMEOUT.as_secs().try_into().unwrap(),
@@ -68,8 +68,8 @@ fn assert_ends_with_its_service(service: &str, needs_sweep: bool) {
     }
     assert_eq!(processes_marked(&mark), [] as [i32; 0]);
     if had_cgroups {
-        // Another test process may have swept in the meantime, since each one does at its start.
-        sweep_stale();
+        // Another test process may have removed them in the meantime, since each one does at its first spawn.
+        remove_remains_of_dead_services();
         assert_eq!(remaining_cgroups(), [] as [std::path::PathBuf; 0]);
     }
 }

@@ -26,7 +26,9 @@ fn programs_find_an_ordinary_system() {
         }
         assert!(found.len() >= 12, "{found:?}");
         let usage = agent.finish(TIMEOUT).unwrap();
+        // It ended with status 0.
         assert_eq!(usage.exit, None, "{}", usage.stderr);
+        // By each of `/dev/stderr`, `/proc/self/fd/2` and `/dev/fd/2`.
         assert_eq!(
             usage.stderr.matches("written by path").count(),
             3,

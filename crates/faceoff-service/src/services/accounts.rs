@@ -1,7 +1,7 @@
 //! Creation of a user's account: the user accepts an invitation by its code, and founds or joins a team, or becomes an
 //! organiser.
 
-use crate::{app::AppState, boxed, network::Network, problem::Problem, text};
+use crate::{app::AppState, boxed_future, network::Network, problem::Problem, text};
 use faceoff_api::{
     requests::{self, FoundedTeam, InvitedRole},
     secret_extraction::InvitationLink,
@@ -52,7 +52,7 @@ pub fn checked_profile(team: FoundedTeam) -> Result<(TeamName, TeamProfile), Pro
 }
 
 /// Accepts an invitation, and creates a token or a session for the user, as `token_kind` says.
-#[boxed]
+#[boxed_future]
 pub async fn join(
     app: &AppState,
     request: requests::JoinRequest,

@@ -3,7 +3,7 @@
 use crate::{
     app::AppState,
     auth::{Caller, TeamCaller},
-    boxed,
+    boxed_future,
     problem::Problem,
     text,
     views::announcement,
@@ -23,7 +23,7 @@ const MAX_QUESTION_CHARS: usize = 2_000;
 const MAX_TERMS_CHARS: usize = 20_000;
 
 /// Publishes an announcement. It cannot be changed.
-#[boxed]
+#[boxed_future]
 pub async fn announce(
     app: &AppState,
     actor: Actor,
@@ -38,7 +38,7 @@ pub async fn announce(
 }
 
 /// Is this the newest announcement already? A form that is sent twice must not publish it twice.
-#[boxed]
+#[boxed_future]
 pub async fn is_newest(app: &AppState, new: &NewAnnouncement) -> Result<bool, Problem> {
     let title = text::single_line("title", &new.title, MAX_TITLE_CHARS)?;
     let body = text::multi_line("text", &new.text, MAX_TEXT_CHARS)?;
@@ -49,7 +49,7 @@ pub async fn is_newest(app: &AppState, new: &NewAnnouncement) -> Result<bool, Pr
 }
 
 /// Has the team asked this already, without an answer yet? A form that is sent twice must not ask it twice.
-#[boxed]
+#[boxed_future]
 pub async fn is_open_question(
     app: &AppState,
     team: TeamId,
@@ -63,7 +63,7 @@ pub async fn is_open_question(
 }
 
 /// Questions, newest first. Visitors see those with a public answer, teams also their own, organisers all.
-#[boxed]
+#[boxed_future]
 pub async fn questions(
     app: &AppState,
     caller: Option<&Caller>,
@@ -83,7 +83,7 @@ pub async fn questions(
 }
 
 /// Stores a team's question to the organisers.
-#[boxed]
+#[boxed_future]
 pub async fn ask(
     app: &AppState,
     caller: &TeamCaller,
@@ -98,7 +98,7 @@ pub async fn ask(
 }
 
 /// Answers a question, or replaces its answer.
-#[boxed]
+#[boxed_future]
 pub async fn answer(
     app: &AppState,
     actor: Actor,
@@ -113,7 +113,7 @@ pub async fn answer(
 }
 
 /// Publishes a new version of the terms. Teams can upload and activate submissions again once a member has accepted it.
-#[boxed]
+#[boxed_future]
 pub async fn publish_terms(app: &AppState, actor: Actor, new: &NewTerms) -> Result<Terms, Problem> {
     let text = text::multi_line("text", &new.text, MAX_TERMS_CHARS)?;
     let now = app.config.clock.now();

@@ -3,7 +3,7 @@
 //! is detected. This module does not unpack it.
 
 use crate::{
-    boxed, free_space,
+    boxed_future, free_space,
     problem::{Problem, ProblemKind},
     transfer_rate::{MinTransferRate, TransferRateGuard},
 };
@@ -120,7 +120,7 @@ pub(crate) async fn receive(
 ///
 /// # Errors
 /// `TooLarge` beyond `max_bytes`; otherwise as [`receive`].
-#[boxed]
+#[boxed_future]
 pub async fn receive_file(
     body: Body,
     dir: &Path,
@@ -151,7 +151,7 @@ fn create_temp_file(dir: &Path) -> Result<NamedTempFile, Problem> {
 }
 
 /// Reads and discards a body until its end, until `max_bytes` are discarded, or until it is slower than `rate`.
-#[boxed]
+#[boxed_future]
 pub async fn discard(body: Body, rate: MinTransferRate, max_bytes: u64) {
     let mut body = RateGuardedBody::new(body, rate);
     let mut left = max_bytes;

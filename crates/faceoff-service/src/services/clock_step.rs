@@ -4,7 +4,7 @@
 use super::decision_preview::Preview;
 use crate::{
     app::AppState,
-    boxed,
+    boxed_future,
     problem::{Problem, ProblemKind},
 };
 use faceoff_store::Actor;
@@ -47,7 +47,7 @@ fn preview(step: &ClockStep) -> Preview {
 }
 
 /// Accepts the step of the system clock, if that is confirmed with its size.
-#[boxed]
+#[boxed_future]
 pub async fn accept_step(
     app: &AppState,
     actor: Actor,

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     app::AppState,
-    boxed,
+    boxed_future,
     problem::{Problem, ProblemKind},
     views::tournament_state::TournamentState,
 };
@@ -27,7 +27,7 @@ pub struct PlannedDeparture<'a> {
 }
 
 /// Preview of a departure.
-#[boxed]
+#[boxed_future]
 pub async fn preview_departure(
     app: &AppState,
     id: TournamentId,
@@ -50,9 +50,15 @@ fn preview(state: &TournamentState, departure: &PlannedDeparture<'_>) -> Result<
     let name = entrant.name.to_string();
     let reason = reason_sentence(departure.reason);
     let effect = if state.rounds.is_empty() {
+        let consequence = match departure.kind {
+            DepartureKind::Withdrawn => "It may enter again",
+            DepartureKind::Disqualified => {
+                "Before the first round a disqualification only removes the team, like a withdrawal: it may enter again"
+            }
+        };
         format!(
             "the team {name} will leave the tournament, whose first round has not started. Its unfinished test and friendly games \
-             will be cancelled. It may enter again"
+             will be cancelled. {consequence}"
         )
     } else if state.tournament.rules.finishes_round(departure.kind) {
         format!(
@@ -85,7 +91,7 @@ fn preview(state: &TournamentState, departure: &PlannedDeparture<'_>) -> Result<
 }
 
 /// Lets a team leave a tournament for good, if that is confirmed with the team's name.
-#[boxed]
+#[boxed_future]
 pub async fn leave_tournament(
     app: &AppState,
     actor: Actor,
@@ -104,7 +110,7 @@ pub async fn leave_tournament(
 }
 
 /// Lets the team with the name in the request leave a tournament, like [`leave_tournament`].
-#[boxed]
+#[boxed_future]
 pub async fn leave_by_name(
     app: &AppState,
     actor: Actor,

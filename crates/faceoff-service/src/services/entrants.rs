@@ -2,7 +2,7 @@
 
 use crate::{
     app::AppState,
-    boxed,
+    boxed_future,
     problem::Problem,
     views::{board, tournament_state::TournamentState, visibility::Visibility},
 };
@@ -16,7 +16,7 @@ use std::collections::{BTreeMap, BTreeSet};
 ///
 /// # Errors
 /// `InvalidContent`, for the request's `field`: a name is unknown, or occurs twice.
-#[boxed]
+#[boxed_future]
 pub async fn find_by_names(
     app: &AppState,
     field: &str,
@@ -46,7 +46,7 @@ pub async fn find_by_names(
 ///
 /// # Errors
 /// `InvalidContent`: there is no name, or it is unknown; `Conflict` if a team has entered or left, or no more can enter.
-#[boxed]
+#[boxed_future]
 pub async fn enter_teams(
     app: &AppState,
     actor: Actor,
@@ -84,7 +84,7 @@ pub fn check_count(teams: usize) -> Result<(), Problem> {
 /// The teams that qualify for a tournament by their results in a stage. These are the teams in the two better *tiers* (grades of
 /// safety: deployable, improvable) on the stage's live board under its newest rules, without retired teams. In a
 /// competition without tiers all teams of the board qualify. The live board also has results after a freeze of the boards.
-#[boxed]
+#[boxed_future]
 pub async fn qualified_teams(app: &AppState, stage: &Stage) -> Result<Vec<TeamId>, Problem> {
     let query = BoardQuery {
         stage: Some(stage.id),

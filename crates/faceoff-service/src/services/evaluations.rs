@@ -4,7 +4,7 @@
 use super::decision_preview::{Preview, checked_reason, reason_sentence};
 use crate::{
     app::AppState,
-    boxed,
+    boxed_future,
     problem::{Problem, ProblemKind},
     views::{day, stage},
 };
@@ -14,7 +14,7 @@ use faceoff_types::{EvaluationId, StageDay, StageId, TeamId};
 use jiff::Timestamp;
 
 /// Starts the evaluation day of a stage, and returns it. `None`: of the open stage.
-#[boxed]
+#[boxed_future]
 pub async fn start_day(
     app: &AppState,
     actor: Actor,
@@ -80,7 +80,7 @@ async fn start_problem(
 }
 
 /// Starts a past day of a stage that had no cutoff, with the submissions that are active now.
-#[boxed]
+#[boxed_future]
 pub async fn start_missed_day(
     app: &AppState,
     actor: Actor,
@@ -105,7 +105,7 @@ pub async fn start_missed_day(
 }
 
 /// Preview of an extra evaluation, which the organisers grant to one team for a day; `None` if it replaces no result that counts.
-#[boxed]
+#[boxed_future]
 pub async fn preview_extra_evaluation(
     app: &AppState,
     stage_day: StageDay,
@@ -139,7 +139,7 @@ pub async fn preview_extra_evaluation(
 }
 
 /// Grants a team one more evaluation for a day.
-#[boxed]
+#[boxed_future]
 pub async fn grant_extra_evaluation(
     app: &AppState,
     actor: Actor,
@@ -162,7 +162,7 @@ pub async fn grant_extra_evaluation(
 }
 
 /// Cancels an evaluation that has not ended.
-#[boxed]
+#[boxed_future]
 pub async fn cancel_evaluation(
     app: &AppState,
     actor: Actor,
@@ -177,7 +177,7 @@ pub async fn cancel_evaluation(
 }
 
 /// Reruns an evaluation; returns the new one.
-#[boxed]
+#[boxed_future]
 pub async fn rerun_evaluation(
     app: &AppState,
     actor: Actor,

@@ -3,7 +3,7 @@
 use super::decision_preview::{Preview, checked_reason, reason_sentence};
 use crate::{
     app::AppState,
-    boxed,
+    boxed_future,
     problem::Problem,
     viewer::Viewer,
     views::{game, tournament_state::TournamentState},
@@ -19,7 +19,7 @@ pub fn pairing_name(state: &TournamentState, game: &Game) -> Result<String, Prob
 }
 
 /// Preview of voiding the result of a game.
-#[boxed]
+#[boxed_future]
 pub async fn preview_void_game(
     app: &AppState,
     id: GameId,
@@ -36,7 +36,7 @@ pub async fn preview_void_game(
 }
 
 /// Voids the result of a game, if that is confirmed with the names of its teams.
-#[boxed]
+#[boxed_future]
 pub async fn void_game(
     app: &AppState,
     actor: Actor,
@@ -53,7 +53,7 @@ pub async fn void_game(
 }
 
 /// Reruns a game that was voided or failed by a platform fault, with the same submissions and the same seed.
-#[boxed]
+#[boxed_future]
 pub async fn rerun_game(app: &AppState, actor: Actor, id: GameId) -> Result<Game, Problem> {
     game::find_visible(app, Viewer::Organiser, id).await?;
     let now = app.config.clock.now();

@@ -5,7 +5,7 @@ use super::accounts::{RESTORE_ACCESS_VALIDITY, default_expiry, join_link};
 use crate::{
     app::AppState,
     auth::Caller,
-    boxed,
+    boxed_future,
     problem::{Problem, ProblemKind},
     text,
     views::invitation,
@@ -83,7 +83,7 @@ fn invitation_role(
 
 /// At most `limit` of the invitations that the caller may manage, newest first. With `after`, those that come after this invitation;
 /// `None` if it is not in the list.
-#[boxed]
+#[boxed_future]
 pub async fn invitations_after(
     app: &AppState,
     caller: &Caller,
@@ -99,7 +99,7 @@ pub async fn invitations_after(
 }
 
 /// Creates an invitation. Only this response contains its link.
-#[boxed]
+#[boxed_future]
 pub async fn create_invitation(
     app: &AppState,
     caller: &Caller,
@@ -141,7 +141,7 @@ pub async fn create_invitation(
 }
 
 /// Revokes an invitation: its link is invalid from now on.
-#[boxed]
+#[boxed_future]
 pub async fn revoke_invitation(
     app: &AppState,
     caller: &Caller,

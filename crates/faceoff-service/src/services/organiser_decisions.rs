@@ -4,7 +4,7 @@
 use super::decision_preview::{Preview, checked_reason, count_text, reason_sentence};
 use crate::{
     app::AppState,
-    boxed,
+    boxed_future,
     problem::Problem,
     views::{evaluation, visibility::Visibility},
 };
@@ -13,7 +13,7 @@ use faceoff_store::{Actor, Evaluation, EvaluationState, Team};
 use faceoff_types::{EvaluationId, StageDay, TeamId};
 
 /// Preview of voiding an evaluation.
-#[boxed]
+#[boxed_future]
 pub async fn preview_void_evaluation(
     app: &AppState,
     id: EvaluationId,
@@ -32,7 +32,7 @@ pub async fn preview_void_evaluation(
 }
 
 /// Voids an evaluation, if that is confirmed with the team's name.
-#[boxed]
+#[boxed_future]
 pub async fn void_evaluation(
     app: &AppState,
     actor: Actor,
@@ -49,7 +49,7 @@ pub async fn void_evaluation(
 }
 
 /// Preview of voiding a day.
-#[boxed]
+#[boxed_future]
 pub async fn preview_void_day(
     app: &AppState,
     stage_day: StageDay,
@@ -82,7 +82,7 @@ pub async fn preview_void_day(
 }
 
 /// Voids all evaluations of a day, if that is confirmed with the date.
-#[boxed]
+#[boxed_future]
 pub async fn void_day(
     app: &AppState,
     actor: Actor,
@@ -99,7 +99,7 @@ pub async fn void_day(
 }
 
 /// Pauses the queue: no job starts.
-#[boxed]
+#[boxed_future]
 pub async fn pause_queue(app: &AppState, actor: Actor, reason: &str) -> Result<(), Problem> {
     let reason = checked_reason(reason)?;
     let now = app.config.clock.now();
@@ -109,7 +109,7 @@ pub async fn pause_queue(app: &AppState, actor: Actor, reason: &str) -> Result<(
 }
 
 /// Resumes the queue.
-#[boxed]
+#[boxed_future]
 pub async fn resume_queue(app: &AppState, actor: Actor) -> Result<(), Problem> {
     let now = app.config.clock.now();
     app.store.resume_queue(actor, now).await?;
@@ -118,7 +118,7 @@ pub async fn resume_queue(app: &AppState, actor: Actor) -> Result<(), Problem> {
 }
 
 /// Preview of disqualifying a team.
-#[boxed]
+#[boxed_future]
 pub async fn preview_disqualification(
     app: &AppState,
     id: TeamId,
@@ -146,7 +146,7 @@ pub async fn preview_disqualification(
 }
 
 /// Disqualifies a team, if that is confirmed with the team's name.
-#[boxed]
+#[boxed_future]
 pub async fn disqualify_team(
     app: &AppState,
     actor: Actor,
@@ -163,7 +163,7 @@ pub async fn disqualify_team(
 }
 
 /// Lifts a team's disqualification.
-#[boxed]
+#[boxed_future]
 pub async fn reinstate_team(
     app: &AppState,
     actor: Actor,

@@ -9,7 +9,7 @@ use super::{
 use crate::{
     app::{App, AppState},
     auth::TeamCaller,
-    boxed, free_space,
+    boxed_future, free_space,
     partial_uploads::PartialUploadLock,
     problem::{Problem, ProblemKind},
     upload_slots::UploadSlot,
@@ -62,7 +62,7 @@ pub async fn received_bytes(app: &App, team: TeamId, bundle: blake3::Hash) -> Re
 /// # Errors
 /// As [`upload`](super::uploads::upload); `Conflict` if the part does not follow what has arrived, or if a newer connection has
 /// taken the upload over.
-#[boxed]
+#[boxed_future]
 pub async fn receive_part(
     app: &App,
     caller: &TeamCaller,

@@ -4,7 +4,7 @@ use super::{
     accounts::{checked_profile, default_expiry, join_link},
     decision_preview::checked_reason,
 };
-use crate::{app::AppState, boxed, problem::Problem, text, views::invitation};
+use crate::{app::AppState, boxed_future, problem::Problem, text, views::invitation};
 use faceoff_api::{
     requests::{InvitedRole, RegistrationRequest},
     token::{Secret, SecretKind},
@@ -17,7 +17,7 @@ use faceoff_types::RegistrationId;
 const MAX_CONTACT_CHARS: usize = 120;
 
 /// Registers a team. The returned link lets the first member join once the organisers have approved the registration.
-#[boxed]
+#[boxed_future]
 pub async fn register(
     app: &AppState,
     request: RegistrationRequest,
@@ -44,7 +44,7 @@ pub async fn register(
 
 /// Approves a registration and creates the team. `actor` is the cause of the change in the log; `requester` has user and token of the
 /// request, which are checked again when the change is committed.
-#[boxed]
+#[boxed_future]
 pub async fn approve_registration(
     app: &AppState,
     actor: Actor,
@@ -67,7 +67,7 @@ pub async fn approve_registration(
 }
 
 /// Refuses a registration, with a reason that the team reads.
-#[boxed]
+#[boxed_future]
 pub async fn refuse_registration(
     app: &AppState,
     actor: Actor,

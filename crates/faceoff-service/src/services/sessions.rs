@@ -3,7 +3,7 @@
 use crate::{
     app::AppState,
     auth::Caller,
-    boxed,
+    boxed_future,
     network::Network,
     problem::{Problem, ProblemKind},
 };
@@ -24,7 +24,7 @@ pub fn session_expiry(now: Timestamp) -> Timestamp {
 }
 
 /// Ends the session, or revokes the token, of the caller's request.
-#[boxed]
+#[boxed_future]
 pub async fn end(app: &AppState, caller: &Caller) -> Result<(), Problem> {
     let (token, now) = (caller.token.id, app.config.clock.now());
     app.store
@@ -34,7 +34,7 @@ pub async fn end(app: &AppState, caller: &Caller) -> Result<(), Problem> {
 }
 
 /// Signs in the user with this name; returns the user's id and the secret of the new session.
-#[boxed]
+#[boxed_future]
 pub async fn sign_in(
     app: &AppState,
     name: &str,

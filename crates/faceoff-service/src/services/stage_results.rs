@@ -4,14 +4,14 @@
 use super::decision_preview::{Preview, checked_reason};
 use crate::{
     app::AppState,
-    boxed,
+    boxed_future,
     problem::{Problem, ProblemKind},
 };
 use faceoff_store::{Actor, Stage, StoreError};
 use faceoff_types::{StageDay, StageId};
 
 /// Freezes a stage's boards: later results do not appear on them.
-#[boxed]
+#[boxed_future]
 pub async fn freeze_boards(
     app: &AppState,
     actor: Actor,
@@ -26,7 +26,7 @@ pub async fn freeze_boards(
 }
 
 /// Unfreezes a stage's boards.
-#[boxed]
+#[boxed_future]
 pub async fn unfreeze_boards(app: &AppState, actor: Actor, id: StageId) -> Result<(), Problem> {
     let now = app.config.clock.now();
     app.store.unfreeze_boards(actor, id, now).await?;
@@ -35,7 +35,7 @@ pub async fn unfreeze_boards(app: &AppState, actor: Actor, id: StageId) -> Resul
 }
 
 /// Starts a stage's final day, and returns it. This is possible once, after the stage has closed.
-#[boxed]
+#[boxed_future]
 pub async fn start_final_day(
     app: &AppState,
     actor: Actor,
@@ -63,7 +63,7 @@ pub async fn start_final_day(
 }
 
 /// Preview of signing a stage off, if that is possible now.
-#[boxed]
+#[boxed_future]
 pub async fn preview_sign_off(app: &AppState, id: StageId) -> Result<Preview, Problem> {
     let now = app.config.clock.now();
     let stage = app.store.check_can_sign_off(id, now).await?;
@@ -76,7 +76,7 @@ pub async fn preview_sign_off(app: &AppState, id: StageId) -> Result<Preview, Pr
 }
 
 /// Signs a stage's result off, if that is confirmed with the stage's name.
-#[boxed]
+#[boxed_future]
 pub async fn sign_off_stage(
     app: &AppState,
     actor: Actor,

@@ -1,7 +1,7 @@
 //! Creating and changing stages. A *stage* is a part of the season with its own rules, board and daily evaluations. A change of the
 //! rules of an open stage begins a new *revision*, with an empty board.
 
-use crate::{app::AppState, boxed, problem::Problem, views::stage};
+use crate::{app::AppState, boxed_future, problem::Problem, views::stage};
 use faceoff_api::requests::{NewStage, OrNull, StagePatch};
 use faceoff_store::{Actor, Stage, StagePhase};
 use faceoff_types::{
@@ -50,7 +50,7 @@ pub fn check_offered(app: &AppState, requested: Option<&Runtimes>) -> Result<(),
 }
 
 /// Refuses magnitudes of perturbations with which this season cannot be played.
-#[boxed]
+#[boxed_future]
 pub async fn check_season_magnitudes(
     app: &AppState,
     magnitudes: &Magnitudes,
@@ -66,7 +66,7 @@ pub async fn check_season_magnitudes(
 }
 
 /// Creates a stage. Fields that are left out are copied from the open stage, or from the nearest one.
-#[boxed]
+#[boxed_future]
 pub async fn create_stage(app: &AppState, actor: Actor, new: NewStage) -> Result<Stage, Problem> {
     let template = stage::current(app).await?;
     let now = app.config.clock.now();
@@ -75,7 +75,7 @@ pub async fn create_stage(app: &AppState, actor: Actor, new: NewStage) -> Result
         settings: patch,
     } = new;
     check_offered(app, requested_runtimes(&patch))?;
-    let mut rules = template.rules.rules;
+    let mut rules = template.revision.rules;
     rules.ruleset = app.config.competition().ruleset();
     let mut settings = StageSettings {
         episodes_per_shard: template.settings.episodes_per_shard,
@@ -114,7 +114,7 @@ pub async fn create_stage(app: &AppState, actor: Actor, new: NewStage) -> Result
 
 /// Changes a stage. A change that begins a new revision, reorders a board or removes files must be confirmed with the
 /// stage's name.
-#[boxed]
+#[boxed_future]
 pub async fn change_stage(
     app: &AppState,
     actor: Actor,
@@ -123,7 +123,7 @@ pub async fn change_stage(
 ) -> Result<Stage, Problem> {
     let stage = app.store.stage(id).await?;
     let now = app.config.clock.now();
-    let current_rules = &stage.rules.rules;
+    let current_rules = &stage.revision.rules;
     check_offered(app, requested_runtimes(&change))?;
     let mut rules = current_rules.clone();
     let mut settings = stage.settings.clone();
@@ -164,7 +164,7 @@ pub async fn change_stage(
         retention,
     };
     let changed = app.store.change_stage(actor, id, stage_change, now).await?;
-    tracing::info!(stage = %changed.name, %id, revision = changed.rules.number, "stage changed");
+    tracing::info!(stage = %changed.name, %id, revision = changed.revision.number, "stage changed");
     Ok(changed)
 }
 
@@ -214,7 +214,7 @@ async fn retention_effect(
 }
 
 fn new_revision_effect(stage: &Stage) -> String {
-    let number = stage.rules.number;
+    let number = stage.revision.number;
     format!(
         "the new rules will begin revision {} with an empty board; results of revision {number} stay on their own board; \
          this cannot be undone",

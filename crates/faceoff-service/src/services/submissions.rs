@@ -4,7 +4,7 @@
 use crate::{
     app::AppState,
     auth::TeamCaller,
-    boxed,
+    boxed_future,
     problem::{Problem, ProblemKind},
 };
 use faceoff_api::requests::SubmissionChange;
@@ -25,7 +25,7 @@ async fn check_own(app: &AppState, caller: &TeamCaller, id: SubmissionId) -> Res
 }
 
 /// Activates a submission: the next cutoff evaluates it.
-#[boxed]
+#[boxed_future]
 pub async fn activate_submission(
     app: &AppState,
     caller: &TeamCaller,
@@ -40,7 +40,7 @@ pub async fn activate_submission(
 }
 
 /// Withdraws a submission from further evaluations.
-#[boxed]
+#[boxed_future]
 pub async fn withdraw_submission(
     app: &AppState,
     caller: &TeamCaller,
@@ -55,7 +55,7 @@ pub async fn withdraw_submission(
 }
 
 /// Changes label and note of a submission.
-#[boxed]
+#[boxed_future]
 pub async fn describe_submission(
     app: &AppState,
     caller: &TeamCaller,

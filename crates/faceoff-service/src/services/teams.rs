@@ -5,7 +5,7 @@ use super::accounts::checked_profile;
 use crate::{
     app::AppState,
     auth::Caller,
-    boxed,
+    boxed_future,
     problem::{Problem, ProblemKind},
 };
 use faceoff_api::requests::{self, SeasonChange};
@@ -13,7 +13,7 @@ use faceoff_store::{Actor, Team, TeamChange, TeamProfile};
 use faceoff_types::TeamId;
 
 /// The team, if the caller may change it: a member their own, an organiser any.
-#[boxed]
+#[boxed_future]
 pub async fn find_editable(app: &AppState, caller: &Caller, id: TeamId) -> Result<Team, Problem> {
     let team = app.store.team(id).await;
     let team = caller.visible("team", team, |team| team.id)?;
@@ -28,7 +28,7 @@ pub async fn find_editable(app: &AppState, caller: &Caller, id: TeamId) -> Resul
 }
 
 /// Changes a team's name or profile. Only organisers change its division and whether it is a baseline.
-#[boxed]
+#[boxed_future]
 pub async fn change_team(
     app: &AppState,
     caller: &Caller,
@@ -76,7 +76,7 @@ pub async fn change_team(
 }
 
 /// Changes whether teams can register, and the divisions.
-#[boxed]
+#[boxed_future]
 pub async fn change_season(
     app: &AppState,
     actor: Actor,

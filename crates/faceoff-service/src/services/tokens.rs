@@ -4,7 +4,7 @@
 use crate::{
     app::AppState,
     auth::Caller,
-    boxed,
+    boxed_future,
     problem::{Problem, ProblemKind},
     text,
     views::{credentials, token},
@@ -49,7 +49,7 @@ async fn find(app: &AppState, caller: &Caller, id: TokenId) -> Result<Token, Pro
 
 /// At most `limit` of the tokens and sessions that the caller may manage, newest first. With `after`, those that come after this
 /// token; `None` if it is not in the list.
-#[boxed]
+#[boxed_future]
 pub async fn tokens_after(
     app: &AppState,
     caller: &Caller,
@@ -64,7 +64,7 @@ pub async fn tokens_after(
 }
 
 /// The valid tokens and sessions that the caller may manage, newest first.
-#[boxed]
+#[boxed_future]
 pub async fn valid_tokens(app: &AppState, caller: &Caller) -> Result<Vec<Token>, Problem> {
     match manageable(caller) {
         Some(manageable) => {
@@ -97,7 +97,7 @@ fn new_token_owner(caller: &Caller, team: Option<TeamId>) -> Result<TokenOwner, 
 }
 
 /// Creates a token. Only this response contains its secret.
-#[boxed]
+#[boxed_future]
 pub async fn create_token(
     app: &AppState,
     caller: &Caller,
@@ -132,7 +132,7 @@ pub async fn create_token(
 }
 
 /// Replaces a token's secret. Only this response contains the new one.
-#[boxed]
+#[boxed_future]
 pub async fn rotate_token(
     app: &AppState,
     caller: &Caller,
@@ -175,7 +175,7 @@ pub async fn rotate_token(
 
 /// Revokes a token: it is invalid from now on. `created_credentials` says what happens to the credentials that were
 /// created with it. By default they end, too, unless the token is the caller's own: another user's may have been stolen.
-#[boxed]
+#[boxed_future]
 pub async fn revoke_token(
     app: &AppState,
     caller: &Caller,

@@ -3,7 +3,7 @@
 
 use crate::{
     app::AppState,
-    boxed,
+    boxed_future,
     problem::{Problem, ProblemKind},
     views::tournament_state::TournamentState,
 };
@@ -38,7 +38,7 @@ pub fn check_next_round(number: RoundNumber, started: usize) -> Result<(), Probl
 ///
 /// # Errors
 /// `Conflict` if the next round has not the number `expected`, or cannot start.
-#[boxed]
+#[boxed_future]
 pub async fn start_round(
     app: &AppState,
     actor: Actor,

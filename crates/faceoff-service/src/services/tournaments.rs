@@ -5,7 +5,7 @@ use super::{
     entrants,
     stages::{check_offered, check_season_magnitudes, parse_name},
 };
-use crate::{app::AppState, boxed, problem::Problem, views::stage};
+use crate::{app::AppState, boxed_future, problem::Problem, views::stage};
 use faceoff_api::{
     objects_only,
     requests::{NewTournament, TournamentChange},
@@ -16,7 +16,7 @@ use serde::{Serialize, de::DeserializeOwned};
 use serde_json::{Map, Value};
 
 /// Opens a tournament. Without names of teams, those that qualify by the board of the stage enter it.
-#[boxed]
+#[boxed_future]
 pub async fn open_tournament(
     app: &AppState,
     actor: Actor,
@@ -60,7 +60,7 @@ pub async fn open_tournament(
 }
 
 /// Changes a tournament: its rules until the first round starts, everything else until it is closed.
-#[boxed]
+#[boxed_future]
 pub async fn change_tournament(
     app: &AppState,
     actor: Actor,
@@ -92,7 +92,7 @@ pub async fn change_tournament(
 }
 
 /// Pauses a tournament: no game starts; running ones continue.
-#[boxed]
+#[boxed_future]
 pub async fn pause_tournament(
     app: &AppState,
     actor: Actor,
@@ -107,7 +107,7 @@ pub async fn pause_tournament(
 }
 
 /// Resumes a paused tournament.
-#[boxed]
+#[boxed_future]
 pub async fn resume_tournament(
     app: &AppState,
     actor: Actor,
@@ -120,7 +120,7 @@ pub async fn resume_tournament(
 }
 
 /// Preview of closing a tournament.
-#[boxed]
+#[boxed_future]
 pub async fn preview_close(app: &AppState, id: TournamentId) -> Result<Preview, Problem> {
     let record = app.store.tournament_record(id).await?;
     let (tournament, rounds) = (record.tournament, record.rounds.len());
@@ -135,7 +135,7 @@ pub async fn preview_close(app: &AppState, id: TournamentId) -> Result<Preview, 
 }
 
 /// Closes a tournament for good, if that is confirmed with its name: nothing of it can change any more.
-#[boxed]
+#[boxed_future]
 pub async fn close_tournament(
     app: &AppState,
     actor: Actor,

@@ -5,7 +5,7 @@ use super::{
     partial_uploads::{self, UploadGuards},
     upload_limits::{UploadLimits, acquire_slot, check_may_upload, size_limit},
 };
-use crate::{app::App, auth::TeamCaller, boxed, free_space, problem::Problem};
+use crate::{app::App, auth::TeamCaller, boxed_future, free_space, problem::Problem};
 use axum::body::Body;
 use faceoff_store::{Actor, StoreError, Submission, Team};
 use faceoff_types::{ArchiveFormat, BundleRef, IdempotencyKey, TeamId};
@@ -36,7 +36,7 @@ pub enum BundleSource {
 
 /// Receives a bundle, creates the submission and queues its validation run. If a bundle with the same key was uploaded before, it
 /// returns that submission.
-#[boxed]
+#[boxed_future]
 pub async fn upload(
     app: &App,
     caller: &TeamCaller,

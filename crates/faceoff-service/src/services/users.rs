@@ -3,7 +3,7 @@
 use crate::{
     app::AppState,
     auth::Caller,
-    boxed,
+    boxed_future,
     network::Network,
     problem::{Problem, ProblemKind},
 };
@@ -12,7 +12,7 @@ use faceoff_store::{EndedCredentials, Principal, StoreError, User};
 use faceoff_types::{UserId, UserName};
 
 /// The users whom the caller may see: organisers all, a team its members.
-#[boxed]
+#[boxed_future]
 pub async fn list_users(app: &AppState, caller: &Caller) -> Result<Vec<User>, Problem> {
     let users = match caller.team() {
         Some(team) => app.store.members_of(team.id).await?,
@@ -22,7 +22,7 @@ pub async fn list_users(app: &AppState, caller: &Caller) -> Result<Vec<User>, Pr
 }
 
 /// The user, if the caller may act for them: an organiser, or the user. A teammate gets `Forbidden`, others `NotFound`.
-#[boxed]
+#[boxed_future]
 pub async fn find(app: &AppState, caller: &Caller, id: UserId) -> Result<User, Problem> {
     let user = match app.store.user(id).await {
         Ok(user) => user,
@@ -50,7 +50,7 @@ pub async fn find(app: &AppState, caller: &Caller, id: UserId) -> Result<User, P
 ///
 /// # Errors
 /// `Forbidden` or `NotFound` unless the caller is the user or an organiser; `UserNameTaken`: another user has the name.
-#[boxed]
+#[boxed_future]
 pub async fn rename_user(
     app: &AppState,
     caller: &Caller,
@@ -65,7 +65,7 @@ pub async fn rename_user(
 }
 
 /// Closes a user's account, if that is confirmed with the user's name. Returns what ended with it, too.
-#[boxed]
+#[boxed_future]
 pub async fn remove_user(
     app: &AppState,
     caller: &Caller,
@@ -87,7 +87,7 @@ pub async fn remove_user(
 }
 
 /// Accepts the terms for the calling user.
-#[boxed]
+#[boxed_future]
 pub async fn accept_terms(app: &AppState, caller: &Caller, version: u32) -> Result<User, Problem> {
     let Some(user) = caller.user() else {
         return Err(Problem::new(
@@ -108,7 +108,7 @@ pub async fn accept_terms(app: &AppState, caller: &Caller, version: u32) -> Resu
 ///
 /// # Errors
 /// `Forbidden`: another user, or the current password is wrong; `InvalidContent`: the new one is too short.
-#[boxed]
+#[boxed_future]
 pub async fn set_password(
     app: &AppState,
     caller: &Caller,

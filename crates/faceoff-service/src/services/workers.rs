@@ -1,13 +1,13 @@
 //! Decisions about remote workers, which are processes on other machines that run jobs of this server.
 
 use super::decision_preview::checked_reason;
-use crate::{app::AppState, boxed, problem::Problem};
+use crate::{app::AppState, boxed_future, problem::Problem};
 use faceoff_store::Actor;
 use faceoff_types::WorkerName;
 
 /// Bans a worker: its results are rejected from now on. Returns the number of its shards (parts of
 /// unfinished evaluations) that are queued again.
-#[boxed]
+#[boxed_future]
 pub async fn ban_worker(
     app: &AppState,
     actor: Actor,
@@ -23,7 +23,7 @@ pub async fn ban_worker(
 }
 
 /// Lifts a worker's ban.
-#[boxed]
+#[boxed_future]
 pub async fn readmit_worker(
     app: &AppState,
     actor: Actor,

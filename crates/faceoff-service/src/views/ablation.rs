@@ -1,7 +1,7 @@
 //! Ablations. An *ablation* runs one submission in the ideal simulator, under each kind of perturbation alone, and under all of them
 //! (the *profiles*), on the same episodes. It shows what each perturbation costs the agent.
 
-use crate::{app::AppState, boxed, problem::Problem};
+use crate::{app::AppState, boxed_future, problem::Problem};
 use faceoff_api::views::{
     ablation::{AblationStatus, AblationView},
     evaluation::Progress,
@@ -11,7 +11,7 @@ use faceoff_store::{Ablation, AblationState};
 use faceoff_types::{ProfileMap, RunId, SubmissionId, TaskMap};
 
 /// The newest ablation of a submission, if it has one.
-#[boxed]
+#[boxed_future]
 pub async fn newest(
     app: &AppState,
     submission: SubmissionId,
@@ -23,7 +23,7 @@ pub async fn newest(
 }
 
 /// An ablation: its progress while it is running, then the effect of each profile.
-#[boxed]
+#[boxed_future]
 pub async fn build(app: &AppState, ablation: Ablation) -> Result<AblationView, Problem> {
     let status = match ablation.state {
         AblationState::Unfinished {
@@ -56,7 +56,7 @@ pub async fn build(app: &AppState, ablation: Ablation) -> Result<AblationView, P
 }
 
 /// Whether the submission has an ablation, in any state.
-#[boxed]
+#[boxed_future]
 pub async fn exists(app: &AppState, submission: SubmissionId) -> Result<bool, Problem> {
     Ok(app.store.newest_ablation(submission).await?.is_some())
 }

@@ -4,7 +4,7 @@
 
 use crate::{
     app::AppState,
-    boxed,
+    boxed_future,
     problem::Problem,
     viewer::Viewer,
     views::clip_file::{ClipFile, Episode},
@@ -43,7 +43,7 @@ impl AblationClips {
     ///
     /// # Errors
     /// `NotFound` if there is no such submission.
-    #[boxed]
+    #[boxed_future]
     pub async fn load(
         app: &AppState,
         viewer: Viewer,
@@ -73,7 +73,7 @@ impl AblationClips {
     ///
     /// # Errors
     /// `NotFound` if there is none.
-    #[boxed]
+    #[boxed_future]
     pub async fn profile_file(
         &self,
         app: &AppState,
@@ -87,7 +87,7 @@ impl AblationClips {
     ///
     /// # Errors
     /// An internal problem, if a file cannot be read.
-    #[boxed]
+    #[boxed_future]
     pub async fn differing_episodes(
         &self,
         app: &AppState,
@@ -123,7 +123,7 @@ impl AblationClips {
     ///
     /// # Errors
     /// `NotFound` if it is not stored.
-    #[boxed]
+    #[boxed_future]
     pub async fn episode(
         &self,
         app: &AppState,

@@ -6,7 +6,7 @@
 use crate::{
     aggregated_rows::AggregatedRow,
     app::AppState,
-    boxed,
+    boxed_future,
     problem::{Problem, ProblemKind},
     summaries::RunSummaries,
     views::{board_rows, decision, division, sign_off, stage, team, visibility::Visibility},
@@ -53,7 +53,7 @@ impl BoardSelection {
 ///
 /// # Errors
 /// `Unauthenticated` or `Forbidden` if the viewer may not see the live board of a frozen stage.
-#[boxed]
+#[boxed_future]
 pub async fn requested_stage(
     app: &AppState,
     visibility: &Visibility,
@@ -76,7 +76,7 @@ pub fn unknown_task(competition: &Competition, task: Task) -> Problem {
 }
 
 /// The requested board: the overall one, or that of one task.
-#[boxed]
+#[boxed_future]
 pub async fn query(
     app: &AppState,
     visibility: &Visibility,
@@ -130,7 +130,7 @@ pub async fn query(
 
 /// The board of a stage under one revision of its rules, from the results within `scope` and from `extra` results: those of a proposed
 /// re-evaluation, as if they counted. The number of database reads does not depend on the number of teams.
-#[boxed]
+#[boxed_future]
 pub async fn build(
     app: &AppState,
     visibility: &Visibility,

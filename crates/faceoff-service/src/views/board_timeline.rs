@@ -2,7 +2,7 @@
 
 use crate::{
     app::AppState,
-    boxed,
+    boxed_future,
     problem::Problem,
     views::{board_rows, visibility::Visibility},
 };
@@ -47,7 +47,7 @@ impl EarlierBoard {
 
 impl BoardTimeline {
     /// The timeline of a board as it is shown; `is_live` includes results after a freeze of the boards.
-    #[boxed]
+    #[boxed_future]
     pub async fn load(
         app: &AppState,
         visibility: &Visibility,

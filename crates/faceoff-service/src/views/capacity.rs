@@ -1,7 +1,7 @@
 //! Capacity forecast: whether the evaluations of a day can finish before its deadline. A *slot* runs one job at a time; a job of an
 //! evaluation is a *shard*, a part of its episodes.
 
-use crate::{app::AppState, boxed, config::Capacity, problem::Problem};
+use crate::{app::AppState, boxed_future, config::Capacity, problem::Problem};
 use faceoff_api::views::capacity::{CapacityView, DayLoad, Fit};
 use faceoff_live::Workers;
 use faceoff_store::{EvaluationBacklog, JobDurations, Stage, Store, StoreError};
@@ -173,7 +173,7 @@ fn running_day_load(
 }
 
 /// The forecast at the current time.
-#[boxed]
+#[boxed_future]
 pub async fn build(app: &AppState, id: StageId) -> Result<CapacityView, Problem> {
     let now = app.config.clock.now();
     let forecast = forecast(&app.store, &app.live.workers, &app.config.capacity, id, now);
@@ -181,7 +181,7 @@ pub async fn build(app: &AppState, id: StageId) -> Result<CapacityView, Problem>
 }
 
 /// The forecast at `now`.
-#[boxed]
+#[boxed_future]
 pub async fn forecast(
     store: &Store,
     workers: &Workers,
@@ -202,6 +202,7 @@ pub async fn forecast(
         let mut active = store.active_submissions().await?;
         active.retain(|submission| stage.check_accepts(submission).is_ok());
         let teams: Vec<TeamId> = active.iter().map(|submission| submission.team).collect();
+        // Without a schedule, or if its cutoff is due, the day could start now.
         let cutoff_at = at.unwrap_or(now).max(now);
         loads.push(next_day_load(
             &stage, day, cutoff_at, &teams, &durations, capacity,

@@ -1,7 +1,7 @@
 //! Clip files. A *clip* is a compressed recording: either the motion of robot and puck, which the public may see, or the agent's
 //! observations and actions. A clip file holds the clips of many episodes, or of a game, and is stored as an artifact.
 
-use crate::{app::AppState, boxed, problem::Problem};
+use crate::{app::AppState, boxed_future, problem::Problem};
 use faceoff_replay::{Clip, ClipKey, EpisodeIndexEntry, Pack, ReplayError};
 use faceoff_types::Task;
 use std::path::PathBuf;
@@ -32,7 +32,7 @@ impl ClipFile {
     ///
     /// # Errors
     /// `Internal` if the artifacts cannot be read.
-    #[boxed]
+    #[boxed_future]
     pub async fn find(app: &AppState, key: String) -> Result<Option<Self>, Problem> {
         let artifacts = app.store.artifacts();
         if artifacts.size_bytes(&key).await?.is_none() {
@@ -61,7 +61,7 @@ impl ClipFile {
     ///
     /// # Errors
     /// `NotFound` if there is no such episode.
-    #[boxed]
+    #[boxed_future]
     pub async fn clip(&self, key: ClipKey) -> Result<Vec<u8>, Problem> {
         let clip = self.read(move |pack| pack.clip(key)).await?;
         clip.ok_or_else(|| Problem::not_found("episode"))
@@ -71,7 +71,7 @@ impl ClipFile {
     ///
     /// # Errors
     /// `NotFound` if there is no such episode.
-    #[boxed]
+    #[boxed_future]
     pub async fn episode(
         &self,
         task: Task,

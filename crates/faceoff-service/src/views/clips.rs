@@ -3,7 +3,7 @@
 
 use crate::{
     app::AppState,
-    archive_contents, boxed,
+    archive_contents, boxed_future,
     day_release::check_released,
     problem::{Problem, ProblemKind},
     views::{
@@ -31,7 +31,7 @@ impl Clips {
     /// # Errors
     /// `NotFound`; `NotYet` before the release; `Blind` for a blind stage; `Removed` if the dataset was removed; `Conflict`
     /// without a result, and for evaluations by an older version of the server, which recorded no clips.
-    #[boxed]
+    #[boxed_future]
     pub async fn find(
         app: &AppState,
         visibility: &Visibility,
@@ -73,7 +73,7 @@ impl Clips {
     ///
     /// # Errors
     /// `NotFound` if there is no such episode.
-    #[boxed]
+    #[boxed_future]
     pub async fn clip(&self, key: ClipKey) -> Result<Vec<u8>, Problem> {
         self.file.clip(key).await
     }
@@ -82,7 +82,7 @@ impl Clips {
     ///
     /// # Errors
     /// `NotFound` if there is no such episode.
-    #[boxed]
+    #[boxed_future]
     pub async fn episode(&self, task: Task, episode: u32) -> Result<Episode, Problem> {
         self.file
             .episode(task, episode, self.can_see_observations)
@@ -93,7 +93,7 @@ impl Clips {
     ///
     /// # Errors
     /// `Internal` if the file cannot be read.
-    #[boxed]
+    #[boxed_future]
     pub async fn computation_times(&self) -> Result<TaskMap<Vec<TimeBinView>>, Problem> {
         match self.can_see_observations {
             true => Ok(self.episodes().await?.computation_times),
@@ -105,7 +105,7 @@ impl Clips {
     ///
     /// # Errors
     /// `Internal` if the file cannot be read.
-    #[boxed]
+    #[boxed_future]
     pub async fn episodes(&self) -> Result<EpisodesView, Problem> {
         let ClipIndex {
             mut episodes,

@@ -2,7 +2,7 @@
 
 use crate::{
     app::AppState,
-    boxed,
+    boxed_future,
     day_release::check_released,
     problem::{Problem, ProblemKind},
     views::visibility::Visibility,
@@ -83,7 +83,7 @@ impl Side {
 /// # Errors
 /// `NotFound`; `Conflict` while one has no result; `Blind` until their stage is revealed; `NotYet` until their day is
 /// released; `NotPaired` if their episodes differ.
-#[boxed]
+#[boxed_future]
 pub async fn compare(
     app: &AppState,
     visibility: &Visibility,

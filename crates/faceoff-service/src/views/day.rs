@@ -2,7 +2,7 @@
 
 use crate::{
     app::AppState,
-    boxed,
+    boxed_future,
     problem::Problem,
     views::{evaluation, exclusions, team, visibility::Visibility},
 };
@@ -13,7 +13,7 @@ use jiff::Timestamp;
 use std::collections::BTreeSet;
 
 /// An evaluation day with its evaluations, for organisers.
-#[boxed]
+#[boxed_future]
 pub async fn build(app: &AppState, stage_day: StageDay) -> Result<DayView, Problem> {
     let visibility = Visibility::for_organiser(app).await?;
     let mut evaluations = evaluation::day_evaluations(app, &visibility, stage_day).await?;
@@ -38,7 +38,7 @@ pub async fn build(app: &AppState, stage_day: StageDay) -> Result<DayView, Probl
 }
 
 /// The next cutoff of a stage; `None` if it has no further day, or the season is closed.
-#[boxed]
+#[boxed_future]
 pub async fn next_cutoff(app: &AppState, stage: &Stage) -> Result<Option<NextCutoff>, Problem> {
     if app.store.season().await?.closed_at.is_some() {
         return Ok(None);

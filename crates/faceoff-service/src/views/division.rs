@@ -3,7 +3,7 @@
 
 use crate::{
     app::AppState,
-    boxed,
+    boxed_future,
     problem::{Problem, ProblemKind},
 };
 use faceoff_types::DivisionName;
@@ -12,7 +12,7 @@ use faceoff_types::DivisionName;
 ///
 /// # Errors
 /// `NotFound`, with the names of all divisions.
-#[boxed]
+#[boxed_future]
 pub async fn find(
     app: &AppState,
     requested: Option<DivisionName>,

@@ -2,7 +2,7 @@
 
 use crate::{
     app::AppState,
-    boxed,
+    boxed_future,
     problem::Problem,
     views::{decision, queue, visibility::Visibility},
 };
@@ -23,7 +23,7 @@ use std::{collections::BTreeMap, sync::Arc};
 const DATASET_REMOVED: &str = "Done. The result stays; the dataset was removed.";
 
 /// An evaluation, with its faults if the viewer may see them.
-#[boxed]
+#[boxed_future]
 pub async fn find(
     app: &AppState,
     visibility: &Visibility,
@@ -33,7 +33,7 @@ pub async fn find(
 }
 
 /// The evaluation as organisers see it.
-#[boxed]
+#[boxed_future]
 pub async fn for_organiser(
     app: &AppState,
     evaluation: Evaluation,
@@ -43,7 +43,7 @@ pub async fn for_organiser(
 
 /// An evaluation with its position in the queue. If it failed by agent faults and its day is released, its team and the organisers
 /// also see the faults and the log.
-#[boxed]
+#[boxed_future]
 pub async fn build(
     app: &AppState,
     visibility: &Visibility,
@@ -67,7 +67,7 @@ pub async fn build(
 }
 
 /// Adds positions in the queue to unfinished evaluations. If all have ended, the database is not read.
-#[boxed]
+#[boxed_future]
 pub async fn add_queue_positions(
     app: &AppState,
     views: &mut [EvaluationView],
@@ -83,7 +83,7 @@ pub async fn add_queue_positions(
 }
 
 /// The evaluations of a day.
-#[boxed]
+#[boxed_future]
 pub async fn day_evaluations(
     app: &AppState,
     visibility: &Visibility,
@@ -98,7 +98,7 @@ pub async fn day_evaluations(
 }
 
 /// Unfinished evaluations of the day before, then those of `today`.
-#[boxed]
+#[boxed_future]
 pub async fn current(
     app: &AppState,
     visibility: &Visibility,
@@ -117,7 +117,7 @@ pub async fn current(
 }
 
 /// Views of these evaluations, in order; without faults and logs, which are long.
-#[boxed]
+#[boxed_future]
 pub async fn all(
     app: &AppState,
     visibility: &Visibility,
@@ -257,7 +257,7 @@ fn evaluation_view(
 }
 
 /// Episode summary of a finished evaluation: solved episodes and certainty of its tiers.
-#[boxed]
+#[boxed_future]
 pub async fn summary(
     view: &EvaluationView,
     app: &AppState,

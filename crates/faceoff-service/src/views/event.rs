@@ -1,7 +1,7 @@
 //! The event log, which organisers read: every change of the season, with its time, its actor (who made it) and its subject (what was
 //! changed).
 
-use crate::{app::AppState, boxed, problem::Problem};
+use crate::{app::AppState, boxed_future, problem::Problem};
 use faceoff_api::{
     requests::EventsQuery,
     views::event::{EventView, EventsView},
@@ -17,7 +17,7 @@ const DEFAULT_LIMIT: u32 = 100;
 const MAX_LIMIT: u32 = 1000;
 
 /// The page of events that a query selects.
-#[boxed]
+#[boxed_future]
 pub async fn page(app: &AppState, query: EventsQuery) -> Result<EventsView, Problem> {
     let limit = query.limit.unwrap_or(DEFAULT_LIMIT);
     if !(1..=MAX_LIMIT).contains(&limit) {
@@ -53,7 +53,7 @@ pub async fn page(app: &AppState, query: EventsQuery) -> Result<EventsView, Prob
 }
 
 /// Names of all users and teams, by actor as the log writes it, such as `team:ID`.
-#[boxed]
+#[boxed_future]
 pub async fn actor_names(app: &AppState) -> Result<BTreeMap<String, String>, Problem> {
     let users = app.store.users().await?.into_iter();
     let teams = app.store.teams().await?.into_iter();

@@ -1,6 +1,6 @@
 //! News feed of the season: announcements, openings and closings of stages and tournaments, and releases of evaluation days.
 
-use crate::{app::AppState, boxed, problem::Problem};
+use crate::{app::AppState, boxed_future, problem::Problem};
 use faceoff_store::Stage;
 use jiff::Timestamp;
 use uuid::Uuid;
@@ -63,7 +63,7 @@ pub fn feed_id(commitment: &str) -> Uuid {
 }
 
 /// The newest items, newest first.
-#[boxed]
+#[boxed_future]
 pub async fn newest(app: &AppState) -> Result<Vec<NewsItem>, Problem> {
     let now = app.config.clock.now();
     let mut items = announcements(app).await?;

@@ -2,7 +2,7 @@
 
 use crate::{
     app::AppState,
-    boxed,
+    boxed_future,
     problem::{Problem, ProblemKind},
     viewer::Viewer,
     views::{tournament_state::TournamentState, visibility::GameVisibility},
@@ -21,7 +21,7 @@ use faceoff_types::{GameId, RoundNumber, Side, TournamentId};
 ///
 /// # Errors
 /// `NotFound`, also for a game that the viewer may not see.
-#[boxed]
+#[boxed_future]
 pub async fn find_visible(
     app: &AppState,
     viewer: Viewer,
@@ -45,7 +45,7 @@ const GAME_NOT_FOUND: &str = "there is no such game, or you may not see it; chec
                        to their two teams: check the token";
 
 /// A game that the viewer may see.
-#[boxed]
+#[boxed_future]
 pub async fn find(app: &AppState, viewer: Viewer, id: GameId) -> Result<GameView, Problem> {
     let (state, game) = find_visible(app, viewer, id).await?;
     view(&state, viewer, &game)
@@ -70,7 +70,7 @@ pub fn round_games(
 }
 
 /// The test and friendly games of a tournament that the viewer may see, newest first.
-#[boxed]
+#[boxed_future]
 pub async fn test_and_friendly_games(
     app: &AppState,
     viewer: Viewer,

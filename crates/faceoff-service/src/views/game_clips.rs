@@ -3,7 +3,7 @@
 
 use crate::{
     app::App,
-    boxed,
+    boxed_future,
     problem::{Problem, ProblemKind},
     viewer::Viewer,
     views::{clip_file::ClipFile, game, visibility::GameVisibility},
@@ -26,7 +26,7 @@ impl GameClips {
     ///
     /// # Errors
     /// `NotFound`; `Conflict` without a result, or without stored clips.
-    #[boxed]
+    #[boxed_future]
     pub async fn find(app: &App, viewer: Viewer, id: GameId) -> Result<Self, Problem> {
         let (state, game) = game::find_visible(app, viewer, id).await?;
         Self::find_clips(app, state.visibility(viewer), &game).await
@@ -66,7 +66,7 @@ impl GameClips {
     ///
     /// # Errors
     /// `NotFound` if the game ended before this clip. A clip has a fixed number of steps of the game.
-    #[boxed]
+    #[boxed_future]
     pub async fn clip(&self, key: ClipKey) -> Result<Vec<u8>, Problem> {
         let clip = self.file.read(move |pack| pack.clip(key)).await?;
         clip.ok_or_else(|| {
@@ -81,7 +81,7 @@ impl GameClips {
     ///
     /// # Errors
     /// `Internal` if the clips cannot be read.
-    #[boxed]
+    #[boxed_future]
     pub async fn analysis(&self, app: &App, steps: u32) -> Result<Arc<GameAnalysis>, Problem> {
         let key = self.file.key.clone();
         let compute = async { self.analyse(steps).await.map(Arc::new) };

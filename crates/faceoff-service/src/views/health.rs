@@ -2,7 +2,7 @@
 
 use crate::{
     app::AppState,
-    boxed,
+    boxed_future,
     problem::{Problem, ProblemKind},
     views::{decision, workers},
 };
@@ -14,7 +14,7 @@ use faceoff_store::QueueHealth;
 ///
 /// # Errors
 /// [`ProblemKind::NotReady`]; its `database`, `queue`, `free_space` and `clock` say what is wrong.
-#[boxed]
+#[boxed_future]
 pub async fn check(app: &AppState) -> Result<HealthView, Problem> {
     let free_space = app.store.free_space();
     let is_short = free_space.is_short();

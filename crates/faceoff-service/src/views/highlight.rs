@@ -2,7 +2,7 @@
 
 use crate::{
     app::AppState,
-    boxed,
+    boxed_future,
     highlight::Highlight,
     problem::Problem,
     views::{clips::Clips, visibility::Visibility},
@@ -28,7 +28,7 @@ pub struct TeamHighlight {
 
 /// The highlight of a board with these rows; `None` if no success of the first teams is visible to the viewer. Errors
 /// are in the log, and must not take down the page of which the highlight is an ornament.
-#[boxed]
+#[boxed_future]
 pub async fn of_board(
     app: &AppState,
     visibility: &Visibility,

@@ -3,7 +3,7 @@
 use crate::{
     aggregated_rows::AggregatedRow,
     app::AppState,
-    boxed,
+    boxed_future,
     problem::{Problem, ProblemKind},
     views::{
         board,
@@ -26,7 +26,7 @@ use jiff::civil::Date;
 use std::collections::BTreeMap;
 
 /// The requested history.
-#[boxed]
+#[boxed_future]
 pub async fn query(
     app: &AppState,
     visibility: &Visibility,

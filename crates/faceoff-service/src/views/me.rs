@@ -2,7 +2,7 @@
 
 use crate::{
     app::AppState,
-    boxed,
+    boxed_future,
     problem::Problem,
     viewer::Viewer,
     views::{day, evaluation, stage, submission, team, visibility::Visibility},
@@ -14,7 +14,7 @@ use faceoff_api::views::{
 use faceoff_store::{Evaluation, EvaluationState, Team};
 
 /// The status of a team.
-#[boxed]
+#[boxed_future]
 pub async fn build(app: &AppState, team: Team) -> Result<MeView, Problem> {
     let visibility = Visibility::load(app, Viewer::Team(team.id)).await?;
     let today = stage::current(app).await?.day(app.config.clock.now());

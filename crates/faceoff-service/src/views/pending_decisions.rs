@@ -3,7 +3,7 @@
 
 use crate::{
     app::AppState,
-    boxed,
+    boxed_future,
     problem::Problem,
     views::{tournament, tournament_state::TournamentState},
 };
@@ -13,7 +13,7 @@ use faceoff_types::{EvaluationId, StageName, TournamentId};
 use std::{collections::BTreeSet, sync::Arc};
 
 /// The number of pending decisions; `None` if the database cannot be read, which the page itself says.
-#[boxed]
+#[boxed_future]
 pub async fn count(app: &AppState) -> Option<usize> {
     let minute = app.config.clock.now().as_second() / 60;
     let key = (app.store.change_count(), minute);
@@ -69,7 +69,7 @@ pub enum TournamentDecisionKind {
 }
 
 /// The pending decisions about tournaments, in order of creation. A tournament without a started round has none: teams may still enter.
-#[boxed]
+#[boxed_future]
 pub async fn of_tournaments(app: &AppState) -> Result<Vec<TournamentDecision>, Problem> {
     let mut decisions = Vec::new();
     for tournament in app.store.tournaments().await? {

@@ -4,7 +4,7 @@
 
 use crate::{
     app::AppState,
-    boxed,
+    boxed_future,
     problem::Problem,
     views::{
         board::{self, BoardSelection},
@@ -246,7 +246,7 @@ fn changes(old: &BoardView, new: &BoardView) -> Vec<ChangeView> {
 }
 
 /// The proposals, in order, without their evaluations and outcomes.
-#[boxed]
+#[boxed_future]
 pub async fn list(app: &AppState, proposals: Vec<Proposal>) -> Result<Vec<ProposalView>, Problem> {
     let mut views = Vec::new();
     for proposal in proposals {
@@ -257,12 +257,12 @@ pub async fn list(app: &AppState, proposals: Vec<Proposal>) -> Result<Vec<Propos
 }
 
 /// A proposal with its evaluations and, once it can be decided, the changes that it would make.
-#[boxed]
+#[boxed_future]
 pub async fn find(app: &AppState, id: ProposalId) -> Result<ProposalView, Problem> {
     let (proposal, proposed) = app.store.proposal(id).await?;
     let summary = summary(app, &proposal, &proposed).await?;
     let board_effect = match summary.state {
-        ProposalStateView::Played => Some(board_effect(app, &proposal, &proposed).await?),
+        ProposalStateView::Finished => Some(board_effect(app, &proposal, &proposed).await?),
         _ => None,
     };
     let is_dropped = matches!(proposal.outcome, Some(ProposalOutcome::Dropped(_)));
@@ -288,8 +288,8 @@ async fn summary(
     let (state, decided_at) = match proposal.outcome {
         Some(ProposalOutcome::Applied(at)) => (ProposalStateView::Applied, Some(at)),
         Some(ProposalOutcome::Dropped(at)) => (ProposalStateView::Dropped, Some(at)),
-        None if is_over => (ProposalStateView::Played, None),
-        None => (ProposalStateView::Playing, None),
+        None if is_over => (ProposalStateView::Finished, None),
+        None => (ProposalStateView::Running, None),
     };
     Ok(ProposalView {
         id: proposal.id,

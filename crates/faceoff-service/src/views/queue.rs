@@ -1,6 +1,6 @@
 //! Positions in the queue of jobs, with the time at which each evaluation or validation run is expected to end.
 
-use crate::{app::AppState, boxed, problem::Problem};
+use crate::{app::AppState, boxed_future, problem::Problem};
 use faceoff_api::views::queue::QueueView;
 use faceoff_store::{QueueForecast, QueuePosition};
 use jiff::{RoundMode, Timestamp, TimestampRound, Unit};
@@ -28,7 +28,7 @@ pub fn slots(app: &AppState) -> u32 {
 }
 
 /// Positions and expected completion of all pending and running evaluations and validation runs.
-#[boxed]
+#[boxed_future]
 pub async fn forecast(app: &AppState) -> Result<QueueForecast, Problem> {
     let now = app.config.clock.now();
     Ok(app.store.queue_forecast(slots(app), now).await?)

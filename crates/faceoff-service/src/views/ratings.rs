@@ -2,7 +2,7 @@
 
 use crate::{
     app::App,
-    boxed,
+    boxed_future,
     problem::{Problem, ProblemKind},
     views::tournament_state::TournamentState,
 };
@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 /// The ratings, cached until the season changes. They are computed in a separate task, so that the result is cached even
 /// if the client disconnects.
-#[boxed]
+#[boxed_future]
 pub async fn ratings(app: &App, id: TournamentId) -> Result<Arc<Ratings>, Problem> {
     let app = Arc::clone(app);
     let task = tokio::spawn(async move {
@@ -39,7 +39,7 @@ async fn compute_ratings(app: &App, id: TournamentId) -> Result<Ratings, Problem
 }
 
 /// The head-to-head record of each pair of teams that met, by name.
-#[boxed]
+#[boxed_future]
 pub async fn head_to_head_records(app: &App, id: TournamentId) -> Result<Vec<HeadToHead>, Problem> {
     let state = TournamentState::find(app, id).await?;
     Ok(head_to_head(

@@ -1,7 +1,7 @@
 //! Runtimes and resource limits of agents, for the server and for each stage and tournament. A *runtime* is an environment in which an
 //! agent runs, for example Python with its packages.
 
-use crate::{app::AppState, boxed, problem::Problem, views::stage};
+use crate::{app::AppState, boxed_future, problem::Problem, views::stage};
 use faceoff_api::views::{
     runtimes::{Absent, RuntimesView, StageResources, TournamentResources},
     stage::PhaseView,
@@ -9,7 +9,7 @@ use faceoff_api::views::{
 use faceoff_types::{RuntimeContent, RuntimeInventory, Runtimes};
 
 /// The current runtimes and limits.
-#[boxed]
+#[boxed_future]
 pub async fn build(app: &AppState) -> Result<RuntimesView, Problem> {
     let resources = &app.config.agent_resources;
     let aborted = || Problem::internal("the inspection of the runtimes was aborted");
@@ -30,7 +30,7 @@ pub async fn build(app: &AppState) -> Result<RuntimesView, Problem> {
         if phase == PhaseView::Closed || stage.sign_off.is_some() {
             continue;
         }
-        let rules = &stage.rules.rules;
+        let rules = &stage.revision.rules;
         stages.push(StageResources {
             runtimes: accepted_names(rules.runtimes.as_ref()),
             limits: rules.limits.apply_to(&resources.limits),

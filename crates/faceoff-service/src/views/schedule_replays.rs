@@ -3,7 +3,7 @@
 
 use crate::{
     app::App,
-    boxed,
+    boxed_future,
     problem::Problem,
     views::{tournament::first_place, tournament_state::TournamentState},
 };
@@ -15,7 +15,7 @@ use std::{collections::BTreeMap, sync::Arc};
 
 /// The shares, cached until the season changes. They are computed in a separate task, so that the result is cached even
 /// if the client disconnects.
-#[boxed]
+#[boxed_future]
 pub async fn champion_shares(
     app: &App,
     id: TournamentId,

@@ -3,7 +3,7 @@
 
 use crate::{
     app::AppState,
-    boxed,
+    boxed_future,
     problem::Problem,
     viewer::Viewer,
     views::{archive, day, decision, stage, visibility::Visibility},
@@ -16,7 +16,7 @@ use faceoff_types::{Seed, StageDay};
 use std::{collections::HashMap, sync::atomic::Ordering};
 
 /// The season, as the viewer may see it.
-#[boxed]
+#[boxed_future]
 pub async fn build(app: &AppState, viewer: Viewer) -> Result<SeasonView, Problem> {
     let season = app.store.season().await?;
     update_has_tournaments(app).await?;
@@ -78,7 +78,7 @@ pub struct SeasonSummary {
 
 impl SeasonSummary {
     /// The current data.
-    #[boxed]
+    #[boxed_future]
     pub async fn load(app: &AppState) -> Result<Self, Problem> {
         let season = app.store.season().await?;
         update_has_tournaments(app).await?;

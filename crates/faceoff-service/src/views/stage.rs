@@ -3,7 +3,7 @@
 
 use crate::{
     app::AppState,
-    boxed,
+    boxed_future,
     problem::Problem,
     viewer::Viewer,
     views::{capacity, day, decision, sign_off},
@@ -29,7 +29,7 @@ pub fn phase(phase: StagePhase) -> PhaseView {
 }
 
 /// All stages, in order of their opening, without capacity forecasts.
-#[boxed]
+#[boxed_future]
 pub async fn all(app: &AppState) -> Result<Vec<StageView>, Problem> {
     let mut views = Vec::new();
     for stage in app.store.stages().await? {
@@ -39,13 +39,13 @@ pub async fn all(app: &AppState) -> Result<Vec<StageView>, Problem> {
 }
 
 /// A stage without its capacity forecast.
-#[boxed]
+#[boxed_future]
 pub async fn find(app: &AppState, id: StageId) -> Result<StageView, Problem> {
     build(app, app.store.stage(id).await?).await
 }
 
 /// Adds the capacity forecast, if the viewer may see it.
-#[boxed]
+#[boxed_future]
 pub async fn for_viewer(
     view: StageView,
     app: &AppState,
@@ -62,7 +62,7 @@ pub async fn for_viewer(
 }
 
 /// All stages as the viewer may see them, in order of their opening.
-#[boxed]
+#[boxed_future]
 pub async fn all_for_viewer(app: &AppState, viewer: Viewer) -> Result<Vec<StageView>, Problem> {
     let mut views = Vec::new();
     for view in all(app).await? {
@@ -72,7 +72,7 @@ pub async fn all_for_viewer(app: &AppState, viewer: Viewer) -> Result<Vec<StageV
 }
 
 /// A stage without its capacity forecast.
-#[boxed]
+#[boxed_future]
 pub async fn build(app: &AppState, stage: Stage) -> Result<StageView, Problem> {
     let revisions = app.store.stage_revisions(stage.id).await?;
     Ok(StageView {
@@ -89,14 +89,14 @@ pub async fn build(app: &AppState, stage: Stage) -> Result<StageView, Problem> {
         configured: stage.configured,
         sign_off: stage.sign_off.map(sign_off::view),
         settings: stage.settings,
-        rules: revision(stage.rules),
+        rules: revision(stage.revision),
         revisions: revisions.into_iter().map(revision).collect(),
         capacity: None,
     })
 }
 
 /// The stage of requests that name none: the open one, or the nearest in time.
-#[boxed]
+#[boxed_future]
 pub async fn current(app: &AppState) -> Result<Stage, Problem> {
     let current = app.store.current_stage(app.config.clock.now()).await?;
     current.ok_or_else(|| Problem::internal("the season has no stage"))

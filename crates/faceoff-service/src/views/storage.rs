@@ -1,6 +1,6 @@
 //! Disk usage of teams, and their quota of stored bundles.
 
-use crate::{app::AppState, boxed, problem::Problem, views::stage};
+use crate::{app::AppState, boxed_future, problem::Problem, views::stage};
 use faceoff_api::views::storage::StorageView;
 use faceoff_store::{StorageScope, TeamStorage};
 use faceoff_types::TeamId;
@@ -20,13 +20,13 @@ fn view(storage: TeamStorage, quota_bytes: u64, scope: StorageScope) -> StorageV
 }
 
 /// Disk usage of all teams by name, for organisers.
-#[boxed]
+#[boxed_future]
 pub async fn all(app: &AppState) -> Result<Vec<StorageView>, Problem> {
     usage(app, None, StorageScope::All).await
 }
 
 /// Disk usage of a team, for the team itself or for organisers. `scope` says whether proposed re-evaluations count.
-#[boxed]
+#[boxed_future]
 pub async fn find(
     app: &AppState,
     team: TeamId,

@@ -3,7 +3,7 @@
 
 use crate::{
     app::AppState,
-    boxed,
+    boxed_future,
     problem::Problem,
     views::{decision, exclusions, queue},
 };
@@ -19,13 +19,13 @@ use jiff::Timestamp;
 const BUNDLE_REMOVED: &str = "It cannot be evaluated any more: its bundle was deleted. Its results stay; to evaluate it again, upload it again.";
 
 /// A submission with its log and its position in the queue.
-#[boxed]
+#[boxed_future]
 pub async fn find(app: &AppState, id: SubmissionId) -> Result<SubmissionView, Problem> {
     build(app, app.store.submission(id).await?).await
 }
 
 /// A submission with its log and its position in the queue.
-#[boxed]
+#[boxed_future]
 pub async fn build(app: &AppState, submission: Submission) -> Result<SubmissionView, Problem> {
     let log = app.store.submission_log(submission.id).await?;
     let (stages, now) = (app.store.stages().await?, app.config.clock.now());
@@ -35,7 +35,7 @@ pub async fn build(app: &AppState, submission: Submission) -> Result<SubmissionV
 }
 
 /// The submissions of a team, newest first.
-#[boxed]
+#[boxed_future]
 pub async fn team_submissions(
     app: &AppState,
     team: TeamId,
@@ -44,7 +44,7 @@ pub async fn team_submissions(
 }
 
 /// Views of these submissions, in order; without their logs, which are long.
-#[boxed]
+#[boxed_future]
 pub async fn all(
     app: &AppState,
     submissions: Vec<Submission>,

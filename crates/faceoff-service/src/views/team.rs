@@ -1,6 +1,6 @@
 //! Teams: name, profile and state.
 
-use crate::{app::AppState, boxed, problem::Problem, views::decision};
+use crate::{app::AppState, boxed_future, problem::Problem, views::decision};
 use faceoff_api::views::team::TeamView;
 use faceoff_store::Team;
 use faceoff_types::TeamId;
@@ -22,7 +22,7 @@ pub fn view(team: Team) -> TeamView {
 }
 
 /// A team, including that setting.
-#[boxed]
+#[boxed_future]
 pub async fn find(app: &AppState, id: TeamId) -> Result<TeamView, Problem> {
     Ok(TeamView {
         declines_friendly_games: Some(app.store.declines_friendly_games(id).await?),
@@ -31,7 +31,7 @@ pub async fn find(app: &AppState, id: TeamId) -> Result<TeamView, Problem> {
 }
 
 /// All teams, by name.
-#[boxed]
+#[boxed_future]
 pub async fn all(app: &AppState) -> Result<Vec<TeamView>, Problem> {
     let teams = app.store.teams().await?;
     Ok(teams.into_iter().map(view).collect())

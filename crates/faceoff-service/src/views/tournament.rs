@@ -3,7 +3,7 @@
 
 use crate::{
     app::AppState,
-    boxed,
+    boxed_future,
     problem::Problem,
     views::{decision, tournament_state::TournamentState},
 };
@@ -19,7 +19,7 @@ use faceoff_store::{Departure, Entrant, Game, GamePurpose, GameState, Tournament
 use faceoff_types::{RoundNumber, StageName, TeamId, TeamName, TournamentId};
 
 /// Summaries of all tournaments, without rounds and tables, in order of creation.
-#[boxed]
+#[boxed_future]
 pub async fn summaries(app: &AppState) -> Result<Vec<TournamentSummary>, Problem> {
     let mut summaries = Vec::new();
     for tournament in app.store.tournaments().await? {
@@ -29,7 +29,7 @@ pub async fn summaries(app: &AppState) -> Result<Vec<TournamentSummary>, Problem
 }
 
 /// The state of a tournament for lists: standings are built only once they decide the champion.
-#[boxed]
+#[boxed_future]
 pub async fn state_for_list(app: &AppState, id: TournamentId) -> Result<TournamentState, Problem> {
     let state = TournamentState::without_standings(app, id).await?;
     match is_decided(&state) {
@@ -76,7 +76,7 @@ fn build_summary(state: &TournamentState, tables: &[Table]) -> TournamentSummary
 }
 
 /// A tournament with its rounds and tables.
-#[boxed]
+#[boxed_future]
 pub async fn find(app: &AppState, id: TournamentId) -> Result<TournamentView, Problem> {
     view(&TournamentState::find(app, id).await?)
 }
@@ -100,7 +100,7 @@ pub fn view(state: &TournamentState) -> Result<TournamentView, Problem> {
 }
 
 /// Ids and names of the tournaments that a team has entered, in order of creation.
-#[boxed]
+#[boxed_future]
 pub async fn entered_tournaments(
     app: &AppState,
     team: TeamId,

@@ -2,7 +2,8 @@
 //! and results are in the types of `faceoff-scoring`; the command `faceoff score tournament` reads the same types from a file.
 
 use crate::{
-    app::AppState, boxed, problem::Problem, viewer::Viewer, views::visibility::GameVisibility,
+    app::AppState, boxed_future, problem::Problem, viewer::Viewer,
+    views::visibility::GameVisibility,
 };
 use faceoff_scoring::tournament::{
     Departure, Departures, GameScore, PlayedGame,
@@ -39,7 +40,7 @@ pub struct TournamentState {
 
 impl TournamentState {
     /// The state with draws and results.
-    #[boxed]
+    #[boxed_future]
     pub async fn find(app: &AppState, id: TournamentId) -> Result<Self, Problem> {
         Self::without_standings(app, id).await?.with_standings()
     }
@@ -52,7 +53,7 @@ impl TournamentState {
     }
 
     /// The state without draws and results: enough for single games, but not for tables.
-    #[boxed]
+    #[boxed_future]
     pub async fn without_standings(app: &AppState, id: TournamentId) -> Result<Self, Problem> {
         let TournamentRecord {
             tournament,

@@ -1,7 +1,7 @@
 //! Violations of an evaluation: for each task and constraint, the episodes in which the robot violated it. A *constraint* is a limit
 //! of the robot's motion, such as the largest joint velocity. The data is the file `violations.json` of the dataset.
 
-use crate::{app::AppState, boxed, problem::Problem};
+use crate::{app::AppState, boxed_future, problem::Problem};
 use faceoff_api::views::violations::ViolationsView;
 use faceoff_dataset::Dataset;
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use std::sync::Arc;
 ///
 /// # Errors
 /// `Internal` if the dataset cannot be read: a finished evaluation must have one.
-#[boxed]
+#[boxed_future]
 pub async fn read(app: &AppState, dataset: &str) -> Result<ViolationsView, Problem> {
     let path = app
         .store

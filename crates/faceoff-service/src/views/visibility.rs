@@ -8,7 +8,7 @@
 
 use crate::{
     app::AppState,
-    boxed,
+    boxed_future,
     problem::{Problem, ProblemKind},
     viewer::Viewer,
 };
@@ -59,7 +59,7 @@ const fn scored_at(state: &EvaluationState) -> Option<Timestamp> {
 
 impl Visibility {
     /// What the viewer may see now.
-    #[boxed]
+    #[boxed_future]
     pub async fn load(app: &AppState, viewer: Viewer) -> Result<Self, Problem> {
         let now = app.config.clock.now();
         let season_has_closed = app.store.season().await?.closed_at.is_some();
@@ -83,7 +83,7 @@ impl Visibility {
         })
     }
 
-    #[boxed]
+    #[boxed_future]
     pub async fn for_organiser(app: &AppState) -> Result<Self, Problem> {
         Self::load(app, Viewer::Organiser).await
     }

@@ -1,6 +1,6 @@
 //! Remote workers: processes on other machines that run jobs of this server. A worker runs one job in each of its *slots*.
 
-use crate::{app::AppState, boxed, problem::Problem};
+use crate::{app::AppState, boxed_future, problem::Problem};
 use faceoff_api::views::workers::{
     BusySlotView, WorkerBanView, WorkerState, WorkerView, WorkersView,
 };
@@ -14,7 +14,7 @@ const ALARM_AFTER: SignedDuration = SignedDuration::from_hours(1);
 const MAX_LISTED: u32 = 100;
 
 /// All workers, with the bans.
-#[boxed]
+#[boxed_future]
 pub async fn with_bans(app: &AppState) -> Result<WorkersView, Problem> {
     let mut bans = Vec::new();
     for ban in app.store.worker_bans().await? {

@@ -2,7 +2,7 @@
 //! with all, to show which kind costs it points. Each of these sets of perturbations is a *profile*.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{job_purpose, runs},
@@ -23,7 +23,7 @@ impl Store {
     /// Queues an ablation of a valid submission: the plan's tasks in each of the profiles, instead of in the plan's.
     /// [`StoreError::Conflict`] if the submission is not valid, or has an open ablation;
     /// [`StoreError::SeasonClosed`] once the season is over.
-    #[boxed]
+    #[boxed_future]
     pub async fn request_ablation(
         &self,
         actor: Actor,

@@ -1,7 +1,7 @@
 //! Choice of a team's active submission: the one that is evaluated from the next cutoff on.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     store::Store,
@@ -53,7 +53,7 @@ impl Store {
     /// [`StoreError::Conflict`] if the submission is not valid (yet), or its bundle was removed;
     /// [`StoreError::Disqualified`] if its team is disqualified;
     /// [`StoreError::SeasonClosed`] once the season is over.
-    #[boxed]
+    #[boxed_future]
     pub async fn activate_submission(
         &self,
         actor: Actor,

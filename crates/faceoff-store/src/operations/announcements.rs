@@ -1,7 +1,7 @@
 //! Public announcements, and questions of teams with their answers.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     store::Store,
@@ -17,7 +17,7 @@ use jiff::Timestamp;
 pub const MAX_OPEN_QUESTIONS: i64 = 10;
 
 impl Store {
-    #[boxed]
+    #[boxed_future]
     pub async fn announce(
         &self,
         actor: Actor,
@@ -42,13 +42,13 @@ impl Store {
     }
 
     /// At most `limit` announcements, the newest first.
-    #[boxed]
+    #[boxed_future]
     pub async fn announcements(&self, limit: u32) -> Result<Vec<Announcement>> {
         announcements::newest(&mut *self.database.read.acquire().await?, limit).await
     }
 
     /// Adds a question of a team. [`StoreError::Conflict`] if it has [`MAX_OPEN_QUESTIONS`] unanswered ones.
-    #[boxed]
+    #[boxed_future]
     pub async fn ask(
         &self,
         actor: Actor,
@@ -77,7 +77,7 @@ impl Store {
     }
 
     /// Answers a question, or replaces its answer. A public answer is shown to everyone, together with the question.
-    #[boxed]
+    #[boxed_future]
     pub async fn answer(
         &self,
         actor: Actor,
@@ -102,7 +102,7 @@ impl Store {
     }
 
     /// All questions, the newest first.
-    #[boxed]
+    #[boxed_future]
     pub async fn questions(&self) -> Result<Vec<Question>> {
         questions::all(&mut *self.database.read.acquire().await?).await
     }

@@ -1,7 +1,7 @@
 //! Snapshots: a copy of the database for an archive (the season in one file), made while the server runs.
 
 use crate::{
-    boxed,
+    boxed_future,
     database::Database,
     error::{Result, StoreError},
     free_space::FreeSpace,
@@ -50,7 +50,7 @@ impl Store {
     /// this program, is recorded in the copy. The copy gets the episode summaries that the database lacks. Takes disk space and
     /// time in proportion to the database; writers are not blocked. [`StoreError::Conflict`] if a public archive is asked for the
     /// organiser's edition, or if a result without a summary came in meanwhile.
-    #[boxed]
+    #[boxed_future]
     pub async fn snapshot(
         &self,
         folder: &Path,
@@ -114,13 +114,13 @@ impl DatabaseSnapshot {
     }
 
     /// Artifacts in the organiser's archive other than the datasets of evaluations.
-    #[boxed]
+    #[boxed_future]
     pub async fn artifacts_to_archive(&self) -> Result<Vec<ArchivedArtifact>> {
         archive::artifacts(&mut *self.store.database.read.acquire().await?).await
     }
 
     /// Writes the snapshot to a new file, without remains of the removed data, and deletes the copy.
-    #[boxed]
+    #[boxed_future]
     pub async fn finish(self, file: &Path) -> Result<()> {
         copy(&self.file, file).await?;
         self.store.close().await;

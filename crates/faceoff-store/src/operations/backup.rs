@@ -2,7 +2,7 @@
 //! (files in the object store) that its rows refer to.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     operations::{archive_snapshot::copy, scrub_archive::check_references},
     schema::{self, MIGRATIONS},
@@ -35,7 +35,7 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError::NotFound`] if there is no database; if it cannot be read, or the copy cannot be written.
-    #[boxed]
+    #[boxed_future]
     pub async fn copy_database(data_dir: &Path, target: &Path) -> Result<()> {
         let source = data_dir.join(Self::DATABASE_FILE);
         let unreadable = |error| StoreError::artifact(source.display(), &error);
@@ -68,7 +68,7 @@ impl Store {
     ///
     /// # Errors
     /// If the database cannot be written. No process may have it open.
-    #[boxed]
+    #[boxed_future]
     pub async fn skip_event_ids(file: &Path) -> Result<()> {
         let options = SqliteConnectOptions::new()
             .filename(file)

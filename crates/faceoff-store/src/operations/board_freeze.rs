@@ -1,7 +1,7 @@
 //! Board freezes: an organiser keeps the public boards of a stage as they are, for example before a ceremony.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     store::Store,
@@ -13,7 +13,7 @@ use jiff::Timestamp;
 impl Store {
     /// Freezes the boards of a stage as they are at `now`, until they are unfrozen. Evaluation days continue, but
     /// results that finish later are not shown. [`StoreError::Conflict`] if the boards are frozen already.
-    #[boxed]
+    #[boxed_future]
     pub async fn freeze_boards(
         &self,
         actor: Actor,
@@ -42,7 +42,7 @@ impl Store {
     }
 
     /// Unfreezes the boards of a stage: they show all results again. [`StoreError::Conflict`] if they are not frozen.
-    #[boxed]
+    #[boxed_future]
     pub async fn unfreeze_boards(
         &self,
         actor: Actor,
@@ -62,13 +62,13 @@ impl Store {
     }
 
     /// All stages with frozen boards, with time and reason.
-    #[boxed]
+    #[boxed_future]
     pub async fn frozen_boards(&self) -> Result<Vec<(StageId, DecisionRecord)>> {
         board_freezes::all(&mut *self.database.read.acquire().await?).await
     }
 
     /// Time and reason of a stage's board freeze; `None` if its boards are not frozen.
-    #[boxed]
+    #[boxed_future]
     pub async fn board_freeze(&self, stage: StageId) -> Result<Option<DecisionRecord>> {
         board_freezes::find(&mut *self.database.read.acquire().await?, stage).await
     }

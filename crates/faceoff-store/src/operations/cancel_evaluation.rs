@@ -1,7 +1,7 @@
 //! Cancellation of an evaluation by an organiser.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::Actor,
     operations::run_completion,
@@ -15,7 +15,7 @@ use jiff::Timestamp;
 impl Store {
     /// Stops an evaluation that is not over. Workers that run its shards (parts of its episodes) learn of it at their next
     /// heartbeat. If it was the last open one of its day, the day is released.
-    #[boxed]
+    #[boxed_future]
     pub async fn cancel_evaluation(
         &self,
         actor: Actor,

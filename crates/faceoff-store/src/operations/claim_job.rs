@@ -2,7 +2,7 @@
 //! job is a validation run of an upload, a shard (a part of a run's episodes), a scoring, or a game.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Subject},
     operations::{
@@ -37,7 +37,7 @@ impl Store {
     /// share the slots (places for one job) equally; within each of these three kinds, teams get equal slot time. Ablations,
     /// proposals and other games get the remaining slots. A job with an expired lease is leased again. `None`: there is no job to
     /// run now (see [`Store::job_signal`]), or the queue is paused.
-    #[boxed]
+    #[boxed_future]
     pub async fn claim(
         &self,
         worker: &str,
@@ -49,7 +49,7 @@ impl Store {
     }
 
     /// [`claim`](Self::claim), limited to some kinds of jobs.
-    #[boxed]
+    #[boxed_future]
     pub async fn claim_matching(
         &self,
         filter: JobFilter,
@@ -129,12 +129,12 @@ async fn describe_job(tx: &mut Tx, leased: &LeasedJob, worker: &str) -> Result<O
                 let others = all
                     .iter()
                     .filter(|other| other.phase(tx.now) != StagePhase::Closed);
-                for task in others.flat_map(|other| &other.rules.rules.tasks) {
+                for task in others.flat_map(|other| &other.revision.rules.tasks) {
                     if !plan.tasks.contains(task) {
                         plan.tasks.push(*task);
                     }
                 }
-                Box::new((stage.rules.rules.ruleset, plan))
+                Box::new((stage.revision.rules.ruleset, plan))
             });
             let runtimes = stage_runtimes::required_runtimes(&all, tx.now);
             Ok(Job::Validation {

@@ -2,7 +2,7 @@
 //! no submission, and ended credentials.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::Result,
     event::Actor,
     queue::JobClaim,
@@ -53,7 +53,7 @@ impl Store {
     /// Deletes the recordings of evaluations that ended at least [`RECORDINGS_KEPT_FOR`] ago. A finished
     /// evaluation has them in its dataset, the others do not need them any more. Returns the number
     /// of runs. To be called periodically; an interrupted call is completed by the next one.
-    #[boxed]
+    #[boxed_future]
     pub async fn remove_old_recordings(&self, now: Timestamp) -> Result<usize> {
         let ended_until = earlier(now, RECORDINGS_KEPT_FOR);
         let mut connection = self.database.read.acquire().await?;
@@ -71,7 +71,7 @@ impl Store {
 
     /// Deletes the datasets of proposals (trials and proposed re-evaluations) that were dropped at least
     /// [`RECORDINGS_KEPT_FOR`] ago; their results stay readable. Returns the number of datasets. An interrupted call is completed by the next one.
-    #[boxed]
+    #[boxed_future]
     pub async fn remove_dropped_datasets(&self, now: Timestamp) -> Result<usize> {
         let ended_until = earlier(now, RECORDINGS_KEPT_FOR);
         let mut connection = self.database.read.acquire().await?;
@@ -90,7 +90,7 @@ impl Store {
     /// Deletes the bundles of submissions that did not pass their validation run: at once if they are invalid, and
     /// [`PLATFORM_FAILED_BUNDLES_KEPT_FOR`] after a platform fault. Of their logs a team's last [`INVALID_LOGS_KEPT`] stay, and
     /// identical bundles share one; the reasons of all stay. Returns the number of bundles. An interrupted call is completed by the next one.
-    #[boxed]
+    #[boxed_future]
     pub async fn clean_up_failed_submissions(&self, now: Timestamp) -> Result<usize> {
         let ended_until = earlier(now, PLATFORM_FAILED_BUNDLES_KEPT_FOR);
         let mut connection = self.database.read.acquire().await?;
@@ -110,7 +110,7 @@ impl Store {
 
     /// Deletes tokens, sessions and invitations that ended at least [`ENDED_CREDENTIALS_KEPT_FOR`] ago. Accepted invitations stay:
     /// they say who invited whom. Returns the number of deleted rows. An interrupted call is completed by the next one.
-    #[boxed]
+    #[boxed_future]
     pub async fn delete_ended_credentials(&self, now: Timestamp) -> Result<usize> {
         let ended_until = earlier(now, ENDED_CREDENTIALS_KEPT_FOR);
         let mut total = 0;
@@ -130,7 +130,7 @@ impl Store {
 
     /// Deletes bundles that no submission refers to and that were stored at `stored_before` or earlier: a process
     /// was killed between storing the bundle and adding its submission. Returns the number of bundles.
-    #[boxed]
+    #[boxed_future]
     pub async fn remove_orphaned_bundles(&self, stored_before: Timestamp) -> Result<usize> {
         // In this order: a submission added after the files were listed has none of the listed bundles.
         let stored = self

@@ -3,7 +3,7 @@
 //! A run's summary and its dataset remain.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::Result,
     event::Actor,
     operations::{
@@ -19,7 +19,7 @@ use jiff::Timestamp;
 impl Store {
     /// Runs that ended at least [`RECORDINGS_KEPT_FOR`] ago and still have their shards, the oldest first. Completed runs without
     /// an episode summary of this format version are left out: the summary is made from the shards.
-    #[boxed]
+    #[boxed_future]
     pub async fn clearable_runs(&self, summary_version: u32, now: Timestamp) -> Result<Vec<RunId>> {
         let ended_before = earlier(now, RECORDINGS_KEPT_FOR);
         let mut connection = self.database.read.acquire().await?;
@@ -28,7 +28,7 @@ impl Store {
 
     /// Removes the shards of a run that have no agent faults, with their jobs and their progress events. Shards with
     /// faults stay: they record the agent's mistakes. From then on [`Store::outcomes`] refuses the run.
-    #[boxed]
+    #[boxed_future]
     pub async fn clear_run(&self, run: RunId, now: Timestamp) -> Result<()> {
         self.write(Actor::Server, now, async |tx| {
             shards::delete_without_faults(tx, run).await?;

@@ -2,7 +2,7 @@
 //! accepts the step.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::rerun_evaluation::RERUN_PAUSES_S,
@@ -19,7 +19,7 @@ impl Store {
     /// Moves leases, due times of jobs and due times of webhook deliveries, since the clock is about to be moved by `by`.
     /// `accept` moves the clock before the transaction is committed; no job is claimed in between. `now` is the time
     /// afterwards, `size` the text for the event. [`StoreError::Conflict`], and no change, if `accept` returns false.
-    #[boxed]
+    #[boxed_future]
     pub async fn accept_clock_step(
         &self,
         actor: Actor,
@@ -44,7 +44,7 @@ impl Store {
 
     /// Shortens due times that are too far in the future: they were stored when the clock was ahead. For the start of a
     /// server, whose leases last `lease_s`. Returns the number of jobs.
-    #[boxed]
+    #[boxed_future]
     pub async fn shorten_due_times(&self, lease_s: u32, now: Timestamp) -> Result<u64> {
         let longest_s = RERUN_PAUSES_S.into_iter().fold(lease_s, u32::max);
         self.write(Actor::Server, now, async |tx| {

@@ -1,7 +1,7 @@
 //! Commits: a worker stores the result of its job, at most once per lease. The last shard of a run ends the run.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event},
     operations::{
@@ -70,7 +70,7 @@ impl Store {
     /// plan allows, an evaluation ends as [`AgentFailed`](crate::EvaluationState::AgentFailed) and an
     /// ablation ends without a result. The last shard of an evaluation queues its scoring. The
     /// last shard of all runs of an ablation ends the ablation.
-    #[boxed]
+    #[boxed_future]
     pub async fn commit_shard(
         &self,
         claim: &JobClaim,

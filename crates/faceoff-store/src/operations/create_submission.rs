@@ -1,7 +1,7 @@
 //! Upload of a submission: it is added, and its validation run (a check of the bundle) is queued.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::job_purpose,
@@ -26,7 +26,7 @@ fn start_of_utc_day(now: Timestamp) -> Timestamp {
 
 impl Store {
     /// A team's use of its upload quota by `now`.
-    #[boxed]
+    #[boxed_future]
     pub async fn upload_usage(&self, team: TeamId, now: Timestamp) -> Result<UploadUsage> {
         bundles::usage(
             &mut *self.database.read.acquire().await?,
@@ -37,7 +37,7 @@ impl Store {
     }
 
     /// The team's submission that was uploaded with this key, if there is one.
-    #[boxed]
+    #[boxed_future]
     pub async fn uploaded_with_key(
         &self,
         team: TeamId,
@@ -48,7 +48,7 @@ impl Store {
     }
 
     /// Adds a submission without an idempotency key, as [`create_submission_once`](Self::create_submission_once).
-    #[boxed]
+    #[boxed_future]
     pub async fn create_submission(
         &self,
         actor: Actor,
@@ -68,7 +68,7 @@ impl Store {
     /// [`DailyQuotaExceeded`](crate::StoreError::DailyQuotaExceeded) or
     /// [`StorageQuotaExceeded`](crate::StoreError::StorageQuotaExceeded) beyond the team's quota;
     /// [`IdempotencyKeyUsed`](crate::StoreError::IdempotencyKeyUsed) if another bundle was uploaded with the key.
-    #[boxed]
+    #[boxed_future]
     pub async fn create_submission_once(
         &self,
         actor: Actor,

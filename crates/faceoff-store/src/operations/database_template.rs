@@ -1,7 +1,7 @@
 //! An empty database with the current schema, which tests copy instead of running all migrations.
 
 use crate::{
-    boxed,
+    boxed_future,
     database::Database,
     error::{Result, StoreError},
     schema,
@@ -22,7 +22,7 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError::Database`] if it cannot be written.
-    #[boxed]
+    #[boxed_future]
     pub async fn template(folder: &Path) -> Result<PathBuf> {
         let digest = schema::digest();
         let template = folder.join(format!("{}.sqlite3", digest.to_hex()));

@@ -2,7 +2,7 @@
 //! can be released. They count as a lack of server capacity, not as an agent fault.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::run_completion,
@@ -76,7 +76,7 @@ impl Store {
     /// Ends the unfinished evaluations of days past their deadline and releases those days. Evaluations with all their
     /// shards committed are scored first. Returns the days that were ended, each with the number of its unfinished
     /// evaluations. Safe to call repeatedly.
-    #[boxed]
+    #[boxed_future]
     pub async fn end_overdue_days(&self, now: Timestamp) -> Result<Vec<(StageDay, u32)>> {
         let overdue = days::overdue(&mut *self.database.read.acquire().await?, now).await?;
         if overdue.is_empty() {

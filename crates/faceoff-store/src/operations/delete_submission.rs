@@ -1,7 +1,7 @@
 //! Removal of a submission's bundle (the uploaded files) on request of its team or an organiser.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     store::Store,
@@ -99,7 +99,7 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError::Conflict`] with the reason why it would not.
-    #[boxed]
+    #[boxed_future]
     pub async fn check_deletable(&self, id: SubmissionId, now: Timestamp) -> Result<Submission> {
         // The check writes nothing, but needs one consistent view of several tables.
         self.write(Actor::Server, now, async |tx| {
@@ -113,7 +113,7 @@ impl Store {
     /// Removes the bundle of a valid submission for good. It cannot be downloaded from now on; its file is deleted
     /// later, by [`Store::remove_files_of_removed`]. Its results, log and hash stay. The team can read `reason`.
     /// [`StoreError::Conflict`] if the bundle is gone, is still needed, or is evidence.
-    #[boxed]
+    #[boxed_future]
     pub async fn delete_submission(
         &self,
         actor: Actor,

@@ -2,7 +2,7 @@
 //! access, or knowledge, without a password: a token, an invitation, a webhook.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::Result,
     event::{Event, Subject},
     operations::webhooks::disable,
@@ -59,7 +59,7 @@ pub(crate) async fn revoke_created_with(
 
 /// Revokes the credentials of this creator, and those that were created with its tokens, including tokens that had expired or were revoked
 /// before.
-#[boxed]
+#[boxed_future]
 async fn revoke_created(
     tx: &mut Tx,
     creator: Creator,

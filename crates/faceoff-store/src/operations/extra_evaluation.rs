@@ -2,7 +2,7 @@
 //! one replaces it.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
@@ -31,10 +31,12 @@ async fn rules_of_day(tx: &mut Tx, stage: Stage, stage_day: StageDay) -> Result<
         return Ok(stage);
     };
     let revisions = stages::revisions(tx, stage.id).await?;
-    let rules = revisions.into_iter().find(|rules| rules.number == number);
-    let rules = rules
+    let revision = revisions
+        .into_iter()
+        .find(|revision| revision.number == number);
+    let revision = revision
         .ok_or_else(|| StoreError::Damaged(format!("revision {number} of a stage is missing")))?;
-    Ok(Stage { rules, ..stage })
+    Ok(Stage { revision, ..stage })
 }
 
 impl Store {
@@ -44,7 +46,7 @@ impl Store {
     /// [`StoreError::Conflict`] if the team has no active submission, the day's rules exclude it, an evaluation of the day
     /// is open, or one counts and is not to be replaced. [`StoreError::Disqualified`],
     /// [`StoreError::StageNotOpen`], [`StoreError::SeasonClosed`].
-    #[boxed]
+    #[boxed_future]
     pub async fn add_extra_evaluation(
         &self,
         actor: Actor,
@@ -91,12 +93,12 @@ impl Store {
             let plan: RunPlan = stage.plan();
             let setup = DaySetup {
                 stage_day,
-                revision: stage.rules.number,
+                revision: stage.revision.number,
                 seed: match day.released_at {
                     None => stage.seed_label(stage_day.date),
                     Some(_) => SeedLabel::Extra(id),
                 },
-                ruleset: stage.rules.rules.ruleset,
+                ruleset: stage.revision.rules.ruleset,
                 plan,
             };
             let new = NewEvaluation {

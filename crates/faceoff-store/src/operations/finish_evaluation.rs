@@ -1,7 +1,7 @@
 //! End of a scoring job: an evaluation gets its score and its dataset.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::Result,
     event::{Event, Subject},
     operations::{
@@ -22,7 +22,7 @@ impl Store {
     /// released. Idempotent, as [`Store::commit_shard`] is. After
     /// [`StoreError::Database`](crate::StoreError::Database) the database may already refer to the dataset: do not
     /// delete it.
-    #[boxed]
+    #[boxed_future]
     pub async fn finish_evaluation(
         &self,
         claim: &JobClaim,

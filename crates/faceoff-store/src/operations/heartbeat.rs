@@ -1,7 +1,7 @@
 //! Leases of running jobs: a worker renews its lease by heartbeats, or transfers it to another worker.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::Result,
     event::Actor,
     operations::{
@@ -17,7 +17,7 @@ use jiff::Timestamp;
 impl Store {
     /// Extends the lease to `lease_s` seconds from now and stores the progress. False: the lease was
     /// lost or the job was cancelled, so the worker must stop.
-    #[boxed]
+    #[boxed_future]
     pub async fn heartbeat(
         &self,
         claim: &JobClaim,
@@ -41,7 +41,7 @@ impl Store {
     /// Transfers a lease that `claim.holder` took in advance to the worker that starts the job, extended to `lease_s`
     /// seconds from now. False: the lease was lost, or another worker has started the job. So only one of several workers
     /// that got the same job runs it. That worker may repeat the call, since a response can get lost.
-    #[boxed]
+    #[boxed_future]
     pub async fn transfer_lease(
         &self,
         claim: &JobClaim,
@@ -67,7 +67,7 @@ impl Store {
 
     /// Extends the leases of `holder`, and of every name `holder/…`, to at least `lease_s` seconds from now. They may have
     /// expired while heartbeats could not be stored. Returns the number of leases.
-    #[boxed]
+    #[boxed_future]
     pub async fn renew_leases_of(&self, holder: &str, lease_s: u32, now: Timestamp) -> Result<u64> {
         self.write(Actor::Server, now, async |tx| {
             queue::renew_leases(tx, holder, lease_s).await

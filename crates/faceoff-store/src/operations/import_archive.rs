@@ -1,7 +1,7 @@
 //! Import of the database of an archive: a whole season in one file, to be shown read-only. It is untrusted input.
 
 use crate::{
-    boxed, column,
+    boxed_future, column,
     error::{Result, StoreError},
     operations::scrub_archive::check_references,
     schema::MIGRATIONS,
@@ -40,7 +40,7 @@ fn refusal(reason: impl std::fmt::Display) -> StoreError {
 impl Store {
     /// The archive that a data folder's season was imported from. Nothing is created or changed. `None` also if there
     /// is no database yet, or one of a version without archives.
-    #[boxed]
+    #[boxed_future]
     pub async fn archived_in(data_dir: &Path) -> Result<Option<ArchivedSeason>> {
         let file = database_file(data_dir);
         if !file.exists() {

@@ -3,7 +3,7 @@
 //! role [`RestoreAccess`](InvitationRole::RestoreAccess), stored as `return`, give an existing user access again.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
@@ -323,7 +323,7 @@ impl Store {
     /// Creates an invitation. One with which a user gets access again revokes the user's earlier ones. [`StoreError::Conflict`] if it
     /// would be expired, if the team has [`MAX_OPEN_INVITATIONS`] open ones, or the user has left; [`StoreError::NotFound`] if there
     /// is no such team or user.
-    #[boxed]
+    #[boxed_future]
     pub async fn invite(
         &self,
         actor: Actor,
@@ -367,7 +367,7 @@ impl Store {
     }
 
     /// Revokes an invitation. [`StoreError::Conflict`] if it was accepted.
-    #[boxed]
+    #[boxed_future]
     pub async fn revoke_invitation(
         &self,
         actor: Actor,
@@ -393,7 +393,7 @@ impl Store {
     }
 
     /// Status of a code. [`StoreError::InvitationInvalid`] with the reason if it is not valid.
-    #[boxed]
+    #[boxed_future]
     pub async fn code_status(&self, hash: [u8; 32], now: Timestamp) -> Result<CodeStatus> {
         code_status(&mut *self.database.read.acquire().await?, hash, now).await
     }
@@ -401,7 +401,7 @@ impl Store {
     /// Accepts an invitation: a user joins, or gets access again, and receives a token or a session.
     /// [`StoreError::InvitationInvalid`] if it is not valid (any more), [`StoreError::UserNameTaken`],
     /// [`StoreError::TeamNameTaken`], [`StoreError::Conflict`] naming the missing field.
-    #[boxed]
+    #[boxed_future]
     pub async fn join(&self, request: JoinRequest, now: Timestamp) -> Result<JoinOutcome> {
         self.write(Actor::Visitor, now, async |tx| join(tx, request).await)
             .await
@@ -409,7 +409,7 @@ impl Store {
 
     /// At most `limit` invitations, the newest first: all, or those to be a member of a team. With `after`, those that come after
     /// this invitation; `None` if it is not in the list.
-    #[boxed]
+    #[boxed_future]
     pub async fn invitations_after(
         &self,
         team: Option<TeamId>,
@@ -432,7 +432,7 @@ impl Store {
         Ok(Some(listed))
     }
 
-    #[boxed]
+    #[boxed_future]
     pub async fn invitation(&self, id: InvitationId) -> Result<Invitation> {
         invitations::find(&mut *self.database.read.acquire().await?, id).await
     }

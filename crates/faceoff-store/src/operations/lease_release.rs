@@ -2,7 +2,7 @@
 //! fault (a fault of the server or a worker, not of the agent) are counted. Other releases do not count as attempts.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
@@ -102,7 +102,7 @@ impl Store {
     /// ([`RERUN_PAUSES_S`](crate::RERUN_PAUSES_S)). A validation run ends as
     /// [`PlatformFailed`](crate::SubmissionState::PlatformFailed), an ablation ends without a result. For a lost lease
     /// nothing is recorded.
-    #[boxed]
+    #[boxed_future]
     pub async fn release_after_platform_fault(
         &self,
         claim: &JobClaim,
@@ -137,7 +137,7 @@ impl Store {
 
     /// Releases a job at once, on shutdown; the attempt does not count. For a lost lease nothing is
     /// recorded.
-    #[boxed]
+    #[boxed_future]
     pub async fn release(&self, claim: &JobClaim, now: Timestamp) -> Result<()> {
         self.release_after(claim, 0, ReleaseCause::Interrupted, now)
             .await
@@ -145,7 +145,7 @@ impl Store {
 
     /// Releases a job that was leased in advance and not started, if `claim.holder` still holds the lease. False if another
     /// worker holds it, or it is lost. The attempt does not count.
-    #[boxed]
+    #[boxed_future]
     pub async fn release_unstarted(&self, claim: &JobClaim, now: Timestamp) -> Result<bool> {
         let actor = Actor::Worker(claim.holder.clone());
         self.write(actor, now, async |tx| {
@@ -164,7 +164,7 @@ impl Store {
     /// Releases a job that met a full disk; it is run again after a pause. The attempt does not count as a
     /// failure. For a lost lease nothing is recorded. [`health`](Self::health) reports jobs that repeatedly
     /// run out of space on a disk with enough free space.
-    #[boxed]
+    #[boxed_future]
     pub async fn release_disk_full(&self, claim: &JobClaim, now: Timestamp) -> Result<()> {
         let cause = if self.free_space.is_short() {
             ReleaseCause::Interrupted
@@ -177,7 +177,7 @@ impl Store {
 
     /// Extends all leases to `lease_s` seconds from now. Their holders may have been unable to renew them, because the
     /// database could not be written.
-    #[boxed]
+    #[boxed_future]
     pub async fn renew_all_leases(&self, lease_s: u32, now: Timestamp) -> Result<()> {
         self.write(Actor::Server, now, async |tx| {
             queue::renew_all_leases(tx, lease_s, now).await
@@ -206,7 +206,7 @@ impl Store {
 
     /// Releases all jobs leased by `holder` and by every name `holder/…`, none of which is running them. Returns their
     /// number; the attempts do not count.
-    #[boxed]
+    #[boxed_future]
     pub async fn release_leases_of(&self, holder: &str, now: Timestamp) -> Result<u64> {
         let actor = Actor::Worker(holder.to_owned());
         self.write(actor, now, async |tx| requeue_leases_of(tx, holder).await)
@@ -215,7 +215,7 @@ impl Store {
 
     /// Ends the leases of a worker that is known to be dead, and of its slots, before they expire:
     /// `worker` itself and every name `worker/…`. Returns the number of leases. The attempts stay counted.
-    #[boxed]
+    #[boxed_future]
     pub async fn end_leases_of(&self, worker: &str, now: Timestamp) -> Result<u64> {
         let actor = Actor::Worker(worker.to_owned());
         self.write(actor, now, async |tx| queue::end_leases(tx, worker).await)

@@ -2,7 +2,7 @@
 
 use crate::{
     artifacts::Artifacts,
-    boxed,
+    boxed_future,
     database::Database,
     error::{Result, StoreError},
     free_space::FreeSpace,
@@ -16,7 +16,7 @@ use std::{fs::File, path::Path, sync::Arc};
 impl Store {
     /// Opens `data_dir/faceoff.sqlite3` and `data_dir/artifacts`, creating and migrating them as
     /// needed. On the first start it draws the season's secret, from which all seeds are derived.
-    #[boxed]
+    #[boxed_future]
     pub async fn open(data_dir: &Path) -> Result<Self> {
         // Two processes that start at the same time must not both migrate.
         let _folder_lock = lock_folder(data_dir.to_owned()).await?;

@@ -2,7 +2,7 @@
 //! reason.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
@@ -67,7 +67,7 @@ impl Store {
     /// Voids a result or an agent failure: it stays readable, does not count any more, and can be rerun.
     /// [`StoreError::Conflict`] unless the evaluation counts and is finished or failed by its agent, and once its stage is
     /// signed off.
-    #[boxed]
+    #[boxed_future]
     pub async fn void_evaluation(
         &self,
         actor: Actor,
@@ -94,7 +94,7 @@ impl Store {
     /// Voids all counting evaluations of a day and cancels the open ones, so that the day is released. Returns the total
     /// number. [`StoreError::NotFound`] if the day has had no cutoff, [`StoreError::Conflict`] if none counts or is open,
     /// or the stage is signed off.
-    #[boxed]
+    #[boxed_future]
     pub async fn void_day(
         &self,
         actor: Actor,
@@ -131,7 +131,7 @@ impl Store {
 
     /// Disqualifies a team at once. Its open evaluations are cancelled, it leaves all boards and cannot upload or be
     /// evaluated. It leaves open tournaments for good. [`StoreError::Conflict`] if it is disqualified already.
-    #[boxed]
+    #[boxed_future]
     pub async fn disqualify_team(
         &self,
         actor: Actor,
@@ -163,7 +163,7 @@ impl Store {
 
     /// Reinstates a disqualified team: it can be evaluated and is ranked again. Cancelled evaluations can be rerun.
     /// [`StoreError::Conflict`] if it is not disqualified.
-    #[boxed]
+    #[boxed_future]
     pub async fn reinstate_team(
         &self,
         actor: Actor,

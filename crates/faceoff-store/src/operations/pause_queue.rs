@@ -1,7 +1,7 @@
 //! Pause of the job queue by an organiser.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     queue,
@@ -13,7 +13,7 @@ use jiff::Timestamp;
 impl Store {
     /// Pauses the queue: no job is started, running jobs continue to their end, new days are queued.
     /// [`StoreError::Conflict`] if it is paused already.
-    #[boxed]
+    #[boxed_future]
     pub async fn pause_queue(&self, actor: Actor, reason: &str, now: Timestamp) -> Result<()> {
         self.write(actor, now, async |tx| {
             if season::is_paused(tx).await? {
@@ -32,7 +32,7 @@ impl Store {
     }
 
     /// Resumes the queue. [`StoreError::Conflict`] if it is not paused.
-    #[boxed]
+    #[boxed_future]
     pub async fn resume_queue(&self, actor: Actor, now: Timestamp) -> Result<()> {
         self.write(actor, now, async |tx| {
             if !season::is_paused(tx).await? {

@@ -2,7 +2,7 @@
 //! counts. A proposed re-evaluation repeats counting evaluations; its results replace theirs once an organiser applies it.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{job_purpose, organiser_decisions::void, run_completion, runs},
@@ -92,7 +92,7 @@ async fn reevaluation_runs(
         all.push(evaluation_specs::find(tx, *id).await?);
     }
     let has_newest_rules =
-        |spec: &EvaluationSpec| newest.is_some_and(|stage| stage.rules.number == spec.revision);
+        |spec: &EvaluationSpec| newest.is_some_and(|stage| stage.revision.number == spec.revision);
     let teams_with_newest_rules: HashSet<TeamId> = all
         .iter()
         .filter(|spec| has_newest_rules(spec))
@@ -113,7 +113,11 @@ async fn reevaluation_runs(
         let run = run_rows::find(tx, spec.run).await?;
         let (revision, ruleset, plan) = match newest {
             None => (spec.revision, run.ruleset, run.plan),
-            Some(stage) => (stage.rules.number, stage.rules.rules.ruleset, stage.plan()),
+            Some(stage) => (
+                stage.revision.number,
+                stage.revision.rules.ruleset,
+                stage.plan(),
+            ),
         };
         let proposed_run = ProposedRun {
             submission: spec.submission,
@@ -132,7 +136,7 @@ impl Store {
     /// Queues a trial of a stage's active submissions, or of one valid submission, by the stage's rules on episodes of
     /// its own. It appears on no board and runs behind everything that counts. [`StoreError::Conflict`] if there is no
     /// submission to try or the stage has closed; [`StoreError::SeasonClosed`].
-    #[boxed]
+    #[boxed_future]
     pub async fn propose_trial(
         &self,
         actor: Actor,
@@ -175,7 +179,7 @@ impl Store {
             let proposal = Proposal {
                 id,
                 stage: stage.id,
-                revision: stage.rules.number,
+                revision: stage.revision.number,
                 kind: ProposalKind::Trial,
                 reason: reason.to_owned(),
                 created_at: now,
@@ -186,7 +190,7 @@ impl Store {
                 team: submission.team,
                 replaces: None,
                 seed: SeedLabel::Trial(id),
-                ruleset: stage.rules.rules.ruleset,
+                ruleset: stage.revision.rules.ruleset,
                 plan: stage.plan(),
             });
             add_proposal(tx, &proposal, proposed.collect()).await?;
@@ -198,7 +202,7 @@ impl Store {
     /// Queues a re-evaluation of counting results, behind everything that counts: the same submissions on the same
     /// episodes. The results stay until the proposal is applied. [`StoreError::Conflict`] if there is no counting
     /// result or the day is not released; for new rules, if all results have them already.
-    #[boxed]
+    #[boxed_future]
     pub async fn propose_reevaluation(
         &self,
         actor: Actor,
@@ -272,7 +276,7 @@ impl Store {
     /// old results stay, on the board of their revision. Evaluations with a platform fault change nothing.
     /// [`StoreError::Conflict`] if it is a trial, was decided, or has open evaluations; if the boards of its stage are
     /// frozen; or if a result that it would replace does not count any more.
-    #[boxed]
+    #[boxed_future]
     pub async fn apply_proposal(
         &self,
         actor: Actor,
@@ -316,7 +320,7 @@ impl Store {
 
     /// Drops a proposal: its results never count, and its open evaluations are cancelled. [`StoreError::Conflict`] if
     /// it was decided.
-    #[boxed]
+    #[boxed_future]
     pub async fn drop_proposal(
         &self,
         actor: Actor,

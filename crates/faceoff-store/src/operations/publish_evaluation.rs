@@ -1,7 +1,7 @@
 //! Publication of an evaluation and its dataset by its team, before the stage does it automatically.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     queries,
@@ -18,7 +18,7 @@ use jiff::Timestamp;
 impl Store {
     /// Publishes an evaluation and its dataset earlier than its stage's settings do. This cannot be undone.
     /// [`StoreError::Conflict`] unless it is finished, its day is released and its stage is not blind (its scores are not hidden).
-    #[boxed]
+    #[boxed_future]
     pub async fn publish_evaluation(
         &self,
         actor: Actor,

@@ -1,7 +1,7 @@
 //! Registrations of new teams without an invitation, and the organisers' decisions on them.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
@@ -55,7 +55,7 @@ impl Store {
     /// Adds the registration of a team. [`StoreError::Conflict`] if registration is closed, [`MAX_PENDING_REGISTRATIONS`]
     /// are pending, or a field is missing; [`StoreError::TeamNameTaken`] if a team or a pending registration has the
     /// name, or one that looks like it.
-    #[boxed]
+    #[boxed_future]
     pub async fn register(&self, new: NewRegistration, now: Timestamp) -> Result<Registration> {
         self.write(Actor::Visitor, now, async |tx| {
             season::check_open(tx).await?;
@@ -105,7 +105,7 @@ impl Store {
 
     /// Approves a registration: adds its team. The code of the registration becomes the invitation of the first member
     /// and is valid until `expires_at`. [`StoreError::Conflict`] if the registration was decided.
-    #[boxed]
+    #[boxed_future]
     pub async fn approve_registration(
         &self,
         actor: Actor,
@@ -146,7 +146,7 @@ impl Store {
     }
 
     /// Refuses a registration. [`StoreError::Conflict`] if it was decided.
-    #[boxed]
+    #[boxed_future]
     pub async fn refuse_registration(
         &self,
         actor: Actor,
@@ -168,13 +168,13 @@ impl Store {
     }
 
     /// All registrations, the newest first.
-    #[boxed]
+    #[boxed_future]
     pub async fn registrations(&self) -> Result<Vec<Registration>> {
         registrations::all(&mut *self.database.read.acquire().await?).await
     }
 
     /// The divisions, in display order.
-    #[boxed]
+    #[boxed_future]
     pub async fn divisions(&self) -> Result<Vec<DivisionName>> {
         divisions::all(&mut *self.database.read.acquire().await?).await
     }
@@ -182,7 +182,7 @@ impl Store {
     /// Opens or closes registration, and sets the divisions; `None` leaves a setting unchanged.
     /// [`StoreError::Conflict`] if a division with teams is left out, or one is repeated;
     /// [`StoreError::SeasonClosed`] once the season is over.
-    #[boxed]
+    #[boxed_future]
     pub async fn change_season(
         &self,
         actor: Actor,

@@ -2,7 +2,7 @@
 //! revoked.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     tables::{
         tokens::{self, Creator},
@@ -34,7 +34,7 @@ impl Requester {
 }
 
 /// Is the token of the requester valid at `now`, with this secret, and has the user an account?
-#[boxed]
+#[boxed_future]
 pub(crate) async fn is_valid(
     connection: &mut SqliteConnection,
     requester: &Requester,
@@ -56,7 +56,7 @@ pub(crate) async fn is_valid(
 }
 
 /// Returns the creator of what the requester makes. [`StoreError::TokenInvalid`] if the requester has lost the right to it.
-#[boxed]
+#[boxed_future]
 pub(crate) async fn check(
     connection: &mut SqliteConnection,
     requester: &Requester,

@@ -2,7 +2,7 @@
 //! platform faults, otherwise on an organiser's request.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::Actor,
     operations::new_evaluation::{DaySetup, NewEvaluation, queue_evaluation},
@@ -63,7 +63,7 @@ impl Store {
     /// have been cancelled, voided, not run in time, or ended by a platform fault. [`StoreError::Conflict`] if it ended
     /// otherwise, the team has another counting evaluation of the day, or the stage is signed off.
     /// [`StoreError::Disqualified`] if the team is disqualified; [`StoreError::SeasonClosed`] once the season is over.
-    #[boxed]
+    #[boxed_future]
     pub async fn rerun_evaluation(
         &self,
         actor: Actor,

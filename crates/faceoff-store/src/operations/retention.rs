@@ -2,7 +2,7 @@
 //! removes them automatically afterwards.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::cleanup::{RECORDINGS_KEPT_FOR, earlier},
@@ -184,14 +184,14 @@ pub(super) async fn change(tx: &mut Tx, stage: StageId, retention: Retention) ->
 }
 
 impl Store {
-    #[boxed]
+    #[boxed_future]
     pub async fn stage_retention(&self, stage: StageId) -> Result<Retention> {
         retentions::of_stage(&mut *self.database.read.acquire().await?, stage).await
     }
 
     /// Preview, as of `now`, of the files that this retention would remove from a stage: immediately (or once nothing of
     /// the stage is open, undecided or blind), and on a known date.
-    #[boxed]
+    #[boxed_future]
     pub async fn preview_removal(
         &self,
         stage: StageId,
@@ -218,7 +218,7 @@ impl Store {
     /// Applies the retentions of all stages. Datasets and bundles are first marked as removed, with the reason; their
     /// files are deleted [`FILES_KEPT_FOR`] later. Returns a summary of the marked files. To be called periodically; an interrupted call
     /// is completed by the next one.
-    #[boxed]
+    #[boxed_future]
     pub async fn apply_retentions(&self, now: Timestamp) -> Result<RemovalSummary> {
         let mut total = RemovalSummary::default();
         let mut connection = self.database.read.acquire().await?;
@@ -252,7 +252,7 @@ impl Store {
 
     /// Deletes the files of datasets and bundles that were removed at least [`FILES_KEPT_FOR`] ago, by a retention or on
     /// request. Evidence is kept. Returns the number of deleted files.
-    #[boxed]
+    #[boxed_future]
     pub async fn remove_files_of_removed(&self, now: Timestamp) -> Result<usize> {
         let removed_until = earlier(now, FILES_KEPT_FOR);
         let mut connection = self.database.read.acquire().await?;
@@ -277,7 +277,7 @@ impl Store {
     }
 
     /// Measures datasets stored by versions that did not record sizes. Returns the number of datasets.
-    #[boxed]
+    #[boxed_future]
     pub async fn measure_datasets(&self, now: Timestamp) -> Result<usize> {
         let mut connection = self.database.read.acquire().await?;
         let unmeasured = retentions::unmeasured(&mut connection).await?;

@@ -1,7 +1,7 @@
 //! The season as a whole: its name, its competition, and its closing.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::stage_sign_off::is_final_day_pending,
@@ -13,7 +13,7 @@ use jiff::Timestamp;
 
 impl Store {
     /// Renames the season. An event is recorded only if the name changes.
-    #[boxed]
+    #[boxed_future]
     pub async fn name_season(&self, actor: Actor, name: &str, now: Timestamp) -> Result<()> {
         self.write(actor, now, async |tx| {
             if season::rename(tx, name).await? {
@@ -28,7 +28,7 @@ impl Store {
     /// Binds the season to the competition of the server, which is about to show it and to run its jobs. The hash covers what scores
     /// depend on; a newer version of the program may have another. [`StoreError::Conflict`] if the season belongs to another
     /// competition.
-    #[boxed]
+    #[boxed_future]
     pub async fn bind_competition(&self, competition: &Competition, now: Timestamp) -> Result<()> {
         let hash = competition.hash();
         let bound = season::competition(&mut *self.database.read.acquire().await?).await?;
@@ -52,7 +52,7 @@ impl Store {
     /// Closes the season for good: uploads and evaluations end, and its secret becomes public.
     /// [`StoreError::SeasonClosed`] if it is closed already. [`StoreError::Conflict`] while evaluations,
     /// games or a tournament are open, or while a stage is blind or its final day is pending.
-    #[boxed]
+    #[boxed_future]
     pub async fn close_season(&self, actor: Actor, now: Timestamp) -> Result<()> {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;

@@ -2,7 +2,7 @@
 //! sign-off, after which its results are final.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::start_day::{self, CutoffDate},
@@ -94,7 +94,7 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError::Conflict`] with the reason why it would not.
-    #[boxed]
+    #[boxed_future]
     pub async fn check_can_sign_off(&self, id: StageId, now: Timestamp) -> Result<Stage> {
         // The check writes nothing, but needs one consistent view of several tables.
         self.write(Actor::Server, now, async |tx| {
@@ -108,7 +108,7 @@ impl Store {
     /// Signs off a stage's results, which are final from then on. [`StoreError::Conflict`] while neither the stage
     /// nor the season has closed, evaluations are open, the stage is blind, or its final day is pending; and if it is
     /// signed off already.
-    #[boxed]
+    #[boxed_future]
     pub async fn sign_off_stage(&self, actor: Actor, id: StageId, now: Timestamp) -> Result<Stage> {
         self.write(actor.clone(), now, async |tx| {
             let stage = stages::find(tx, id).await?;
@@ -124,7 +124,7 @@ impl Store {
     /// submission is evaluated. [`StoreError::Conflict`] if the stage has no final day, has had it, has not closed or is
     /// signed off, or if no team has a valid submission (the cutoff remains available). [`StoreError::CutoffPassed`] if
     /// a day of the stage had its cutoff on the same date; [`StoreError::SeasonClosed`] once the season is over.
-    #[boxed]
+    #[boxed_future]
     pub async fn start_final_day(
         &self,
         actor: Actor,

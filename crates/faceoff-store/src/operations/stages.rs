@@ -2,7 +2,7 @@
 //! configuration file.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{day_deadlines, retention},
@@ -61,7 +61,7 @@ impl StageChange {
             || differs(self.opens_at.as_ref(), &stage.opens_at)
             || differs(self.closes_at.as_ref(), &stage.closes_at)
             || differs(self.zone.as_ref(), &stage.zone)
-            || differs(self.rules.as_ref(), &stage.rules.rules)
+            || differs(self.rules.as_ref(), &stage.revision.rules)
             || differs(self.settings.as_ref(), &stage.settings)
     }
 }
@@ -99,7 +99,7 @@ async fn create(tx: &mut Tx, stage: &Stage) -> Result<()> {
         opens_at: stage.opens_at,
         closes_at: stage.closes_at,
         zone: stage.zone.clone(),
-        rules: stage.rules.rules.clone(),
+        rules: stage.revision.rules.clone(),
         settings: stage.settings.clone(),
     };
     tx.record(Subject::Stage(stage.id), event);
@@ -144,10 +144,10 @@ async fn change(
         ..stage.clone()
     };
     let phase = stage.phase(now);
-    let rules = change.rules.unwrap_or_else(|| stage.rules.rules.clone());
+    let rules = change.rules.unwrap_or_else(|| stage.revision.rules.clone());
     sign_offs::check_not_signed_off(tx, stage.id).await?;
     let increases_visibility =
-        rules == stage.rules.rules && only_increases_visibility(stage, &changed);
+        rules == stage.revision.rules && only_increases_visibility(stage, &changed);
     if phase == StagePhase::Closed && !increases_visibility {
         return StoreError::conflict(format!(
             "the stage {:?} closed at {}, and a closed stage cannot be changed, except to reveal a blind one or to publish \
@@ -192,7 +192,7 @@ async fn change(
     // At the next start the configuration file must not revert an organiser's change.
     let new_values = (&rules, &changed.settings, &changed.zone);
     let is_manual = source == ChangeSource::Organiser
-        && new_values != (&stage.rules.rules, &stage.settings, &stage.zone);
+        && new_values != (&stage.revision.rules, &stage.settings, &stage.zone);
     if changed != *stage {
         let event = Event::StageChanged {
             name: changed.name.clone(),
@@ -215,9 +215,9 @@ async fn change(
 /// Sets a stage's rules. Once the stage has opened, this creates another revision.
 async fn set_rules(tx: &mut Tx, stage: &Stage, rules: StageRules) -> Result<()> {
     let is_upcoming = stage.phase(tx.now) == StagePhase::Upcoming;
-    let is_new = rules != stage.rules.rules;
+    let is_new = rules != stage.revision.rules;
     let revision = Revision {
-        number: stage.rules.number + u32::from(is_new && !is_upcoming),
+        number: stage.revision.number + u32::from(is_new && !is_upcoming),
         since: if is_upcoming { stage.opens_at } else { tx.now },
         rules,
     };
@@ -239,14 +239,14 @@ async fn set_rules(tx: &mut Tx, stage: &Stage, rules: StageRules) -> Result<()> 
 impl Store {
     /// Creates a stage. [`StoreError::StageNameTaken`] if another one has its name, [`StoreError::Conflict`] if its times
     /// or rules are invalid, [`StoreError::SeasonClosed`] once the season is over.
-    #[boxed]
+    #[boxed_future]
     pub async fn create_stage(&self, actor: Actor, new: NewStage, now: Timestamp) -> Result<Stage> {
         self.create_stage_with_retention(actor, new, Retention::default(), now)
             .await
     }
 
     /// [`create_stage`](Self::create_stage) with a retention for its files.
-    #[boxed]
+    #[boxed_future]
     pub async fn create_stage_with_retention(
         &self,
         actor: Actor,
@@ -266,7 +266,7 @@ impl Store {
                 closes_at: new.closes_at,
                 zone: new.zone,
                 settings: new.settings,
-                rules: Revision {
+                revision: Revision {
                     number: 1,
                     since: opens_at,
                     rules: new.rules,
@@ -284,7 +284,7 @@ impl Store {
 
     /// Changes a stage within the permitted limits; new rules of an open stage create another revision.
     /// [`StoreError::Conflict`] names the field that cannot be changed; [`StoreError::SeasonClosed`] once the season is over.
-    #[boxed]
+    #[boxed_future]
     pub async fn change_stage(
         &self,
         actor: Actor,
@@ -310,7 +310,7 @@ impl Store {
     /// Creates the season's first stage from the configuration file, or updates the stage that follows this file; new rules
     /// create another revision. A stage that an organiser has changed, that has closed, or whose season is closed stays
     /// unchanged. [`StoreError::Conflict`] if the zone changes after the first day.
-    #[boxed]
+    #[boxed_future]
     pub async fn configure_stage(
         &self,
         rules: StageRules,
@@ -333,7 +333,7 @@ impl Store {
                     closes_at: None,
                     zone,
                     settings,
-                    rules: Revision {
+                    revision: Revision {
                         number: 1,
                         since: truncate(now),
                         rules,

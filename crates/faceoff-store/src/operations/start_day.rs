@@ -1,7 +1,7 @@
 //! The cutoff: the moment at which an evaluation day of a stage starts, with each team's active submission.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
@@ -102,9 +102,9 @@ pub(crate) async fn start(
     let stage_day = insert_day(tx, stage, cutoff).await?;
     let setup = DaySetup {
         stage_day,
-        revision: stage.rules.number,
+        revision: stage.revision.number,
         seed: stage.seed_label(stage_day.date),
-        ruleset: stage.rules.rules.ruleset,
+        ruleset: stage.revision.rules.ruleset,
         plan: stage.plan(),
     };
     let mut started = Vec::new();
@@ -151,7 +151,7 @@ impl Store {
     /// earliest upload first. [`StoreError::CutoffPassed`] if the day had its cutoff, [`StoreError::StageNotOpen`] if the
     /// stage is not open, [`StoreError::Conflict`] if no team has a valid submission (the cutoff remains available),
     /// [`StoreError::SeasonClosed`] once the season is over.
-    #[boxed]
+    #[boxed_future]
     pub async fn start_day(
         &self,
         actor: Actor,
@@ -168,7 +168,7 @@ impl Store {
     /// Starts a missed day of the stage late: as [`start_day`](Self::start_day), with the submissions that are active at
     /// `now`. [`StoreError::CutoffPassed`] if the day had its cutoff, [`StoreError::Conflict`] if the date has not passed
     /// or is before the stage.
-    #[boxed]
+    #[boxed_future]
     pub async fn start_missed_day(
         &self,
         actor: Actor,
@@ -187,7 +187,7 @@ impl Store {
 
     /// Starts a stage's day at `now` on behalf of the schedule, even if no team has a valid submission. Safe to call
     /// repeatedly. `None` if the day had its cutoff, or the stage or season is not open.
-    #[boxed]
+    #[boxed_future]
     pub async fn start_scheduled_day(
         &self,
         stage: StageId,

@@ -1,7 +1,7 @@
 //! Teams: their creation, tokens, changes and retirement.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
@@ -55,7 +55,7 @@ pub struct TeamChange {
 impl Store {
     /// Creates a team. `token_hash` is the hash of its bearer token; the token itself is never
     /// stored. [`StoreError::TeamNameTaken`](crate::StoreError::TeamNameTaken) if the name exists, ignoring case.
-    #[boxed]
+    #[boxed_future]
     pub async fn create_team(
         &self,
         actor: Actor,
@@ -73,7 +73,7 @@ impl Store {
     }
 
     /// Replaces the tokens of a team by a new one: the old ones are revoked. Its members' tokens stay valid.
-    #[boxed]
+    #[boxed_future]
     pub async fn set_team_token(
         &self,
         actor: Actor,
@@ -95,7 +95,7 @@ impl Store {
     /// Changes a team's name, profile or baseline status. [`StoreError::TeamNameTaken`] if another team has the name,
     /// [`StoreError::Conflict`] if there is no such division, or the ranks of a signed-off board would change,
     /// [`StoreError::SeasonClosed`] once the season is over.
-    #[boxed]
+    #[boxed_future]
     pub async fn change_team(
         &self,
         actor: Actor,
@@ -151,7 +151,7 @@ impl Store {
     /// Retires a team, on its own or an organiser's request: it cannot upload and is not evaluated on later days.
     /// Evaluations that were queued continue, and its results stay. If an organiser retires it, its files are kept, too.
     /// [`StoreError::Conflict`] if it has retired already.
-    #[boxed]
+    #[boxed_future]
     pub async fn retire_team(&self, actor: Actor, id: TeamId, now: Timestamp) -> Result<Team> {
         self.write(actor.clone(), now, async |tx| {
             let is_by_organiser = match actor {
@@ -170,7 +170,7 @@ impl Store {
     }
 
     /// Lets a retired team take part again. [`StoreError::Conflict`] if it has not retired.
-    #[boxed]
+    #[boxed_future]
     pub async fn return_team(&self, actor: Actor, id: TeamId, now: Timestamp) -> Result<Team> {
         self.write(actor, now, async |tx| {
             if teams::find(tx, id).await?.retired_at.is_none() {

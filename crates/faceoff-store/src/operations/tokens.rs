@@ -2,7 +2,7 @@
 //! revocation. The operator's token is in a file of the data folder; the *operator* runs the server and can read that file.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event},
     operations::{
@@ -183,7 +183,7 @@ pub enum TokenRejection {
 
 impl Store {
     /// Verifies the token with this hash at `now`: revoked and expired tokens are rejected at once.
-    #[boxed]
+    #[boxed_future]
     pub async fn verify_token(
         &self,
         hash: [u8; 32],
@@ -201,7 +201,7 @@ impl Store {
     }
 
     /// Verifies the token with this id at `now`, for a request signed with the token's [hash](Store::token_hash).
-    #[boxed]
+    #[boxed_future]
     pub async fn verify_token_id(
         &self,
         id: TokenId,
@@ -214,13 +214,13 @@ impl Store {
 
     /// Hash of a token's text; it changes on rotation. Serves as a signing key, since only the server and the token's
     /// owner know it.
-    #[boxed]
+    #[boxed_future]
     pub async fn token_hash(&self, id: TokenId) -> Result<[u8; 32]> {
         tokens::hash_of(&mut *self.database.read.acquire().await?, id).await
     }
 
     /// Records that a token was used. Callers need not call it more often than every [`LAST_USE_INTERVAL`].
-    #[boxed]
+    #[boxed_future]
     pub async fn record_token_use(&self, token: &Token, now: Timestamp) -> Result<()> {
         self.write_even_archived(Actor::Server, now, async |tx| {
             tokens::set_last_used(tx, token.id, now).await
@@ -229,7 +229,7 @@ impl Store {
     }
 
     /// Creates a token. [`StoreError::Conflict`] if its owner has [`MAX_TOKENS`], or it would be expired.
-    #[boxed]
+    #[boxed_future]
     pub async fn create_token(&self, actor: Actor, new: NewToken, now: Timestamp) -> Result<Token> {
         self.write(actor, now, async |tx| add_token(tx, new).await)
             .await
@@ -237,7 +237,7 @@ impl Store {
 
     /// Creates the session of a user whose password has been verified against `verified_hash`, its stored form. False if the user has
     /// another password by now, or has left.
-    #[boxed]
+    #[boxed_future]
     pub async fn sign_in(
         &self,
         id: UserId,
@@ -256,7 +256,7 @@ impl Store {
     }
 
     /// Is the requester's token still valid, and has its user an account?
-    #[boxed]
+    #[boxed_future]
     pub async fn is_valid(&self, requester: &Requester, now: Timestamp) -> Result<bool> {
         requester::is_valid(&mut *self.database.read.acquire().await?, requester, now).await
     }
@@ -264,7 +264,7 @@ impl Store {
     /// Replaces the secret of a token; the old secret is invalid from now on, and its expiry remains. The requester becomes its
     /// creator, unless the requester created it or is authenticated by this very token. [`StoreError::Conflict`] if the token is a
     /// session, is expired or revoked, or is the operator's, whose file would still have the old secret.
-    #[boxed]
+    #[boxed_future]
     pub async fn rotate_token(
         &self,
         actor: Actor,
@@ -309,7 +309,7 @@ impl Store {
     }
 
     /// Revokes a token, effective at once. A revoked token is left unchanged.
-    #[boxed]
+    #[boxed_future]
     pub async fn revoke_token(
         &self,
         actor: Actor,
@@ -339,7 +339,7 @@ impl Store {
 
     /// Makes the token with this hash the operator's token, and revokes the previous one. False if the token is revoked or
     /// expired, so that the operator needs a new one.
-    #[boxed]
+    #[boxed_future]
     pub async fn set_operator_token(&self, hash: [u8; 32], now: Timestamp) -> Result<bool> {
         self.write_even_archived(Actor::Server, now, async |tx| {
             if let Some(existing) = tokens::by_hash(tx, hash).await? {
@@ -369,14 +369,14 @@ impl Store {
 
     /// The tokens and sessions that are valid at `now`, the newest first. Their number is bounded: an owner has at most
     /// [`MAX_TOKENS`].
-    #[boxed]
+    #[boxed_future]
     pub async fn valid_tokens(&self, of: TokenFilter, now: Timestamp) -> Result<Vec<Token>> {
         tokens::valid(&mut *self.database.read.acquire().await?, of, now).await
     }
 
     /// At most `limit` tokens and sessions, the newest first. With `after`, those that come after this token; `None` if it is not
     /// in the list.
-    #[boxed]
+    #[boxed_future]
     pub async fn tokens_after(
         &self,
         of: TokenFilter,
@@ -396,7 +396,7 @@ impl Store {
         Ok(Some(listed))
     }
 
-    #[boxed]
+    #[boxed_future]
     pub async fn token(&self, id: TokenId) -> Result<Token> {
         tokens::find(&mut *self.database.read.acquire().await?, id).await
     }

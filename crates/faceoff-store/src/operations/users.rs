@@ -1,7 +1,7 @@
 //! User accounts, and the terms that users accept.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
@@ -20,24 +20,24 @@ use jiff::Timestamp;
 
 impl Store {
     /// All users who have ever joined, by name.
-    #[boxed]
+    #[boxed_future]
     pub async fn users(&self) -> Result<Vec<User>> {
         users::all(&mut *self.database.read.acquire().await?).await
     }
 
     /// Current and former members of a team, by name.
-    #[boxed]
+    #[boxed_future]
     pub async fn members_of(&self, team: TeamId) -> Result<Vec<User>> {
         users::of_team(&mut *self.database.read.acquire().await?, team).await
     }
 
-    #[boxed]
+    #[boxed_future]
     pub async fn user(&self, id: UserId) -> Result<User> {
         users::find(&mut *self.database.read.acquire().await?, id).await
     }
 
     /// Id and password hash (PHC string) of the user with this name, if there is one with a password.
-    #[boxed]
+    #[boxed_future]
     pub async fn password_hash_of(&self, name: &str) -> Result<Option<(UserId, String)>> {
         users::find_with_password(&mut *self.database.read.acquire().await?, name).await
     }
@@ -45,7 +45,7 @@ impl Store {
     /// Sets a user's password, given as a PHC string (a hash with its parameters). All tokens and sessions of the user are revoked
     /// except `used_token`, which authenticated this request. If the user had a password before, the credentials (tokens,
     /// invitations, webhooks) that the user has created are revoked, too.
-    #[boxed]
+    #[boxed_future]
     pub async fn set_password(
         &self,
         actor: Actor,
@@ -75,7 +75,7 @@ impl Store {
 
     /// Renames a user. Tokens and sessions stay valid; the old name no longer signs in.
     /// [`StoreError::UserNameTaken`] if another user has the name, [`StoreError::Conflict`] if the user has left.
-    #[boxed]
+    #[boxed_future]
     pub async fn rename_user(
         &self,
         actor: Actor,
@@ -105,7 +105,7 @@ impl Store {
     /// the user has created. The name stays in the log.
     /// [`StoreError::Conflict`] if the user has left, or if no one could organise the season afterwards: there is no other
     /// organiser and no valid token of the operator.
-    #[boxed]
+    #[boxed_future]
     pub async fn remove_user(
         &self,
         actor: Actor,
@@ -137,14 +137,14 @@ impl Store {
     }
 
     /// All versions of the terms, the newest first.
-    #[boxed]
+    #[boxed_future]
     pub async fn terms(&self) -> Result<Vec<Terms>> {
         terms::all(&mut *self.database.read.acquire().await?).await
     }
 
     /// Sets new terms. Teams cannot upload or choose submissions until one of their members has accepted them.
     /// [`StoreError::Conflict`] if the text is unchanged.
-    #[boxed]
+    #[boxed_future]
     pub async fn publish_terms(&self, actor: Actor, text: &str, now: Timestamp) -> Result<Terms> {
         self.write(actor, now, async |tx| {
             let newest = terms::all(tx).await?.into_iter().next();
@@ -167,7 +167,7 @@ impl Store {
     }
 
     /// Records that a user accepts the terms. [`StoreError::Conflict`] unless `version` is the newest.
-    #[boxed]
+    #[boxed_future]
     pub async fn accept_terms(
         &self,
         actor: Actor,

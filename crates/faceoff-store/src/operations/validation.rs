@@ -1,7 +1,7 @@
 //! Outcome of a validation run: the check whether an uploaded agent can be evaluated.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::Result,
     event::{Event, Subject},
     operations::{
@@ -21,7 +21,7 @@ use jiff::Timestamp;
 impl Store {
     /// Stores the outcome of a validation run. A valid submission becomes its team's active one, unless the team has
     /// withdrawn it, or has uploaded or chosen another one since. Idempotent, as [`Store::commit_shard`] is.
-    #[boxed]
+    #[boxed_future]
     pub async fn commit_validation(
         &self,
         claim: &JobClaim,

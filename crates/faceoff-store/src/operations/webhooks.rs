@@ -1,7 +1,7 @@
 //! Webhooks: addresses to which messages about events are sent. Each message is a delivery, with one or more attempts.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
@@ -130,24 +130,24 @@ pub(crate) async fn disable(tx: &mut Tx, mut webhook: Webhook, reason: String) -
 
 impl Store {
     /// All webhooks, the oldest first.
-    #[boxed]
+    #[boxed_future]
     pub async fn webhooks(&self) -> Result<Vec<Webhook>> {
         webhooks::all(&mut *self.database.read.acquire().await?).await
     }
 
-    #[boxed]
+    #[boxed_future]
     pub async fn webhook(&self, id: WebhookId) -> Result<Webhook> {
         webhooks::find(&mut *self.database.read.acquire().await?, id).await
     }
 
     /// Secrets that sign a webhook's messages at `now`.
-    #[boxed]
+    #[boxed_future]
     pub async fn webhook_secrets(&self, id: WebhookId, now: Timestamp) -> Result<WebhookSecrets> {
         webhooks::secrets(&mut *self.database.read.acquire().await?, id, now).await
     }
 
     /// Creates a webhook for events from now on. [`StoreError::Conflict`] if its owner has as many as allowed.
-    #[boxed]
+    #[boxed_future]
     pub async fn create_webhook(
         &self,
         actor: Actor,
@@ -191,7 +191,7 @@ impl Store {
     }
 
     /// Changes a webhook.
-    #[boxed]
+    #[boxed_future]
     pub async fn change_webhook(
         &self,
         actor: Actor,
@@ -231,7 +231,7 @@ impl Store {
     }
 
     /// Replaces a webhook's secret; the old one also signs for [`OLD_SECRET_VALID_FOR`].
-    #[boxed]
+    #[boxed_future]
     pub async fn rotate_webhook(
         &self,
         actor: Actor,
@@ -259,7 +259,7 @@ impl Store {
     }
 
     /// Removes a webhook with its deliveries.
-    #[boxed]
+    #[boxed_future]
     pub async fn remove_webhook(&self, actor: Actor, id: WebhookId, now: Timestamp) -> Result<()> {
         self.write(actor, now, async |tx| {
             let webhook = webhooks::find(tx, id).await?;
@@ -275,7 +275,7 @@ impl Store {
     }
 
     /// Enabled webhooks that have not seen the newest events and are below the limit of pending deliveries.
-    #[boxed]
+    #[boxed_future]
     pub async fn webhooks_with_new_events(&self) -> Result<Vec<Webhook>> {
         let mut connection = self.database.read.acquire().await?;
         let newest = events::newest_id(&mut connection).await?;
@@ -283,7 +283,7 @@ impl Store {
     }
 
     /// Adds planned deliveries. The plan of a webhook is skipped if another call has planned deliveries of it meanwhile.
-    #[boxed]
+    #[boxed_future]
     pub async fn plan_deliveries(
         &self,
         planned: Vec<PlannedDeliveries>,
@@ -316,7 +316,7 @@ impl Store {
     }
 
     /// Queues a test message to a webhook. [`StoreError::Conflict`] if it is disabled, or a test message is pending.
-    #[boxed]
+    #[boxed_future]
     pub async fn test_webhook(
         &self,
         id: WebhookId,
@@ -354,25 +354,25 @@ impl Store {
     }
 
     /// The oldest due delivery of each webhook at `now`, the oldest first.
-    #[boxed]
+    #[boxed_future]
     pub async fn due_deliveries(&self, now: Timestamp) -> Result<Vec<Delivery>> {
         deliveries::due(&mut *self.database.read.acquire().await?, now).await
     }
 
     /// When the next delivery is due; `None` if none is pending.
-    #[boxed]
+    #[boxed_future]
     pub async fn next_delivery_at(&self) -> Result<Option<Timestamp>> {
         deliveries::next_due(&mut *self.database.read.acquire().await?).await
     }
 
     /// Deliveries of a webhook, the newest first.
-    #[boxed]
+    #[boxed_future]
     pub async fn deliveries(&self, id: WebhookId, limit: u32) -> Result<Vec<Delivery>> {
         deliveries::of_webhook(&mut *self.database.read.acquire().await?, id, limit).await
     }
 
     /// Records a delivery attempt. A webhook that fails for [`DISABLED_AFTER`], or answers 410, is disabled.
-    #[boxed]
+    #[boxed_future]
     pub async fn record_attempt(
         &self,
         id: DeliveryId,
@@ -439,7 +439,7 @@ impl Store {
     }
 
     /// Deletes deliveries that ended at least [`DELIVERIES_KEPT_FOR`] ago. Returns the number of deliveries.
-    #[boxed]
+    #[boxed_future]
     pub async fn delete_old_deliveries(&self, now: Timestamp) -> Result<u64> {
         let ended_before = earlier(now, DELIVERIES_KEPT_FOR);
         self.write(Actor::Server, now, async |tx| {

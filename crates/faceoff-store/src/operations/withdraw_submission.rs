@@ -1,7 +1,7 @@
 //! Withdrawal of a submission by its team, after which it is not evaluated any more.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     store::Store,
@@ -17,7 +17,7 @@ impl Store {
     /// Withdraws a submission: it is not evaluated on later days. If it was active, its team has no active submission
     /// until it chooses or uploads another one. Days past their cutoff are not affected. [`StoreError::Conflict`] if the
     /// submission is not valid, or was withdrawn; [`StoreError::SeasonClosed`] once the season is over.
-    #[boxed]
+    #[boxed_future]
     pub async fn withdraw_submission(
         &self,
         actor: Actor,

@@ -1,7 +1,7 @@
 //! Bans of remote workers (on other machines) whose results are not trusted.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::lease_release::requeue_leases_of,
@@ -19,7 +19,7 @@ impl Store {
     /// Bans a worker. Its running jobs return to the queue at once. The shards (parts of runs) that it committed in
     /// unfinished runs are run again; returns the number of those shards. Finished results stay, for organisers to review
     /// ([`results_of_worker`](Self::results_of_worker)). [`StoreError::Conflict`] if it is banned already.
-    #[boxed]
+    #[boxed_future]
     pub async fn ban_worker(
         &self,
         actor: Actor,
@@ -67,7 +67,7 @@ impl Store {
     }
 
     /// Lifts the ban of a worker. [`StoreError::Conflict`] if it is not banned.
-    #[boxed]
+    #[boxed_future]
     pub async fn readmit_worker(
         &self,
         actor: Actor,

@@ -1,7 +1,7 @@
 //! Queries of ablations: runs of a submission without perturbations, with each one alone, and with all.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::Result,
     store::Store,
     tables::{
@@ -66,7 +66,7 @@ async fn from_row(connection: &mut SqliteConnection, row: AblationRow) -> Result
 
 impl Store {
     /// An ablation; [`StoreError::NotFound`](crate::StoreError::NotFound) if the id is unknown.
-    #[boxed]
+    #[boxed_future]
     pub async fn ablation(&self, id: AblationId) -> Result<Ablation> {
         let mut connection = self.database.read.begin().await?;
         let row = ablations::find(&mut connection, id).await?;
@@ -74,7 +74,7 @@ impl Store {
     }
 
     /// The newest ablation of a submission, if it has any.
-    #[boxed]
+    #[boxed_future]
     pub async fn newest_ablation(&self, submission: SubmissionId) -> Result<Option<Ablation>> {
         newest(&mut *self.database.read.begin().await?, submission).await
     }

@@ -1,7 +1,7 @@
 //! Queries of boards: the ranked results of a stage's teams. A row shows the team's newest evaluation that counts.
 
 use crate::{
-    boxed,
+    boxed_future,
     column::{Instant, Json},
     error::Result,
     store::Store,
@@ -126,14 +126,14 @@ pub struct BoardScope {
 
 impl Store {
     /// The newest revision of a stage's rules under which an evaluation has finished; the current revision if none has.
-    #[boxed]
+    #[boxed_future]
     pub async fn board_revision(&self, stage: &Stage) -> Result<u32> {
         self.board_revision_within(stage, &BoardScope::default())
             .await
     }
 
     /// As [`board_revision`](Self::board_revision), of the evaluations within the time limits of `scope`.
-    #[boxed]
+    #[boxed_future]
     pub async fn board_revision_within(&self, stage: &Stage, scope: &BoardScope) -> Result<u32> {
         let newest = sqlx::query_scalar!(
             r#"SELECT MAX(revision) AS "revision: u32" FROM counting_evaluations
@@ -146,12 +146,12 @@ impl Store {
         let newest = newest
             .fetch_one(&mut *self.database.read.acquire().await?)
             .await?;
-        Ok(newest.unwrap_or(stage.rules.number))
+        Ok(newest.unwrap_or(stage.revision.number))
     }
 
     /// The days of a stage that have results under one revision of its rules within the time limits of `scope`, the
     /// earliest first.
-    #[boxed]
+    #[boxed_future]
     pub async fn board_days(
         &self,
         stage: StageId,
@@ -175,7 +175,7 @@ impl Store {
     }
 
     /// The board of a stage under one revision of its rules, with all results.
-    #[boxed]
+    #[boxed_future]
     pub async fn board(&self, stage: StageId, revision: u32) -> Result<Vec<BoardRecord>> {
         let scope = BoardScope::default();
         self.board_within(stage, revision, &scope).await
@@ -184,7 +184,7 @@ impl Store {
     /// The board of a stage under one revision of its rules, by team name. It has each team's newest finished evaluation
     /// within `scope` that was not voided. Disqualified teams are left out; after the sign-off, those that were
     /// disqualified at that time. Ranks and tiers are computed by the scoring.
-    #[boxed]
+    #[boxed_future]
     pub async fn board_within(
         &self,
         stage: StageId,

@@ -1,7 +1,7 @@
 //! Queries of boards that are computed from several evaluation days of each team.
 
 use crate::{
-    boxed,
+    boxed_future,
     column::{Instant, Json},
     error::Result,
     queries::board::{BoardRecord, BoardScope, select_board},
@@ -32,7 +32,7 @@ pub struct DayScore {
 
 impl Store {
     /// The scores of the teams on a board from `first_day` on, or their success rates in a task, by day. Baselines are left out.
-    #[boxed]
+    #[boxed_future]
     pub async fn day_scores(
         &self,
         stage: StageId,
@@ -77,14 +77,14 @@ impl Store {
     }
 
     /// The cutoff (the start of the evaluations) of a stage's final day; `None` before it.
-    #[boxed]
+    #[boxed_future]
     pub async fn final_cutoff(&self, stage: StageId) -> Result<Option<Timestamp>> {
         crate::tables::sign_offs::final_cutoff(&mut *self.database.read.acquire().await?, stage)
             .await
     }
 
     /// As [`Store::board_within`], with several days of each team: by team name, then by day.
-    #[boxed]
+    #[boxed_future]
     pub async fn board_of_days(
         &self,
         stage: StageId,

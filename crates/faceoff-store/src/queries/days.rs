@@ -1,7 +1,7 @@
 //! Queries of evaluation days. A day starts with its cutoff, and is released when its last evaluation has ended.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::Result,
     store::Store,
     tables::{
@@ -15,32 +15,32 @@ use jiff::{Timestamp, civil::Date};
 impl Store {
     /// All days whose cutoff has passed, the newest first, each with the number of its finished
     /// evaluations.
-    #[boxed]
+    #[boxed_future]
     pub async fn days(&self) -> Result<Vec<(Day, u32)>> {
         days::all(&mut *self.database.read.acquire().await?).await
     }
 
     /// The days that were started later than on their date, each with the reason.
-    #[boxed]
+    #[boxed_future]
     pub async fn missed_days(&self) -> Result<Vec<(StageDay, String)>> {
         days::missed(&mut *self.database.read.acquire().await?).await
     }
 
     /// The days of a stage whose cutoff has passed and that are not released, the earliest first.
-    #[boxed]
+    #[boxed_future]
     pub async fn unreleased_days(&self, stage: StageId) -> Result<Vec<Day>> {
         days::unreleased(&mut *self.database.read.acquire().await?, stage).await
     }
 
     /// The newest day of a stage whose cutoff has passed.
-    #[boxed]
+    #[boxed_future]
     pub async fn newest_day(&self, stage: StageId) -> Result<Option<Day>> {
         days::newest(&mut *self.database.read.acquire().await?, stage).await
     }
 
     /// The newest day of a stage after the current date, if the schedule waits for its date to pass: it was started when a
     /// clock was ahead, and has evaluations that are open or count.
-    #[boxed]
+    #[boxed_future]
     pub async fn future_day(&self, stage: &Stage, now: Timestamp) -> Result<Option<Day>> {
         let today = stage.day(now).date;
         let mut connection = self.database.read.acquire().await?;
@@ -50,7 +50,7 @@ impl Store {
 
     /// The date of the stage's next day, if it has one, and its scheduled cutoff, as
     /// [`Stage::next_cutoff`]. Dates that had a cutoff are left out.
-    #[boxed]
+    #[boxed_future]
     pub async fn next_cutoff(
         &self,
         stage: &Stage,

@@ -1,7 +1,7 @@
 //! Queries of evaluations: a team's runs of all tasks on a day, with their progress.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     store::Store,
     tables::{
@@ -59,7 +59,7 @@ pub enum EvaluationFilter {
 impl Store {
     /// One page of a list: its first evaluations, or those that follow the evaluation `after`. `None` if there is no
     /// evaluation `after`.
-    #[boxed]
+    #[boxed_future]
     pub async fn evaluations_after(
         &self,
         filter: EvaluationFilter,
@@ -88,13 +88,13 @@ impl Store {
     }
 
     /// The evaluation with this id.
-    #[boxed]
+    #[boxed_future]
     pub async fn evaluation(&self, id: EvaluationId) -> Result<Evaluation> {
         find(&mut *self.database.read.begin().await?, id).await
     }
 
     /// A team's evaluations, the newest first.
-    #[boxed]
+    #[boxed_future]
     pub async fn evaluations_of(&self, team: TeamId) -> Result<Vec<Evaluation>> {
         let mut tx = self.database.read.begin().await?;
         let rows = evaluations::of_team(&mut tx, team).await?;
@@ -102,7 +102,7 @@ impl Store {
     }
 
     /// The evaluations of a stage on one day, in the order in which they were queued.
-    #[boxed]
+    #[boxed_future]
     pub async fn evaluations_of_day(&self, stage_day: StageDay) -> Result<Vec<Evaluation>> {
         let mut tx = self.database.read.begin().await?;
         let rows = evaluations::of_day(&mut tx, stage_day).await?;
@@ -110,7 +110,7 @@ impl Store {
     }
 
     /// The evaluations of all stages on this date, in the order in which they were queued.
-    #[boxed]
+    #[boxed_future]
     pub async fn evaluations_on(&self, date: Date) -> Result<Vec<Evaluation>> {
         let mut tx = self.database.read.begin().await?;
         let first = (Timestamp::UNIX_EPOCH, None);

@@ -1,6 +1,6 @@
 //! Gauges of the queue, for monitoring.
 
-use crate::{boxed, error::Result, queue, store::Store};
+use crate::{boxed_future, error::Result, queue, store::Store};
 use jiff::Timestamp;
 
 /// Current numbers of jobs and evaluations.
@@ -22,7 +22,7 @@ pub struct Gauges {
 
 impl Store {
     /// Gauges of the queue at `now`.
-    #[boxed]
+    #[boxed_future]
     pub async fn gauges(&self, now: Timestamp) -> Result<Gauges> {
         let paused = self.season().await?.queue_pause.is_some();
         let mut connection = self.database.read.acquire().await?;

@@ -1,7 +1,7 @@
 //! Queries of proposals: trials and proposed re-evaluations, which do not count (yet).
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     queries::evaluations::with_progress_by,
     store::Store,
@@ -24,14 +24,14 @@ pub(crate) async fn evaluations_of_proposal(
 
 impl Store {
     /// All trials and proposed re-evaluations, the newest first.
-    #[boxed]
+    #[boxed_future]
     pub async fn proposals(&self) -> Result<Vec<Proposal>> {
         proposals::all(&mut *self.database.read.acquire().await?).await
     }
 
     /// An evaluation of a proposal, with the proposal. [`StoreError::NotFound`](crate::StoreError::NotFound)
     /// for evaluations that count.
-    #[boxed]
+    #[boxed_future]
     pub async fn proposed_evaluation(
         &self,
         id: EvaluationId,
@@ -45,7 +45,7 @@ impl Store {
     }
 
     /// A proposal with its evaluations.
-    #[boxed]
+    #[boxed_future]
     pub async fn proposal(&self, id: ProposalId) -> Result<(Proposal, Vec<ProposedEvaluation>)> {
         let mut tx = self.database.read.begin().await?;
         let proposal = proposals::find(&mut tx, id).await?;

@@ -3,7 +3,7 @@
 //! job was measured.
 
 use crate::{
-    boxed,
+    boxed_future,
     column::Instant,
     error::Result,
     queue::forecast::{AccountQueue, DurationMs, Forecast, GroupEnd, JobGroup, QueuedJob},
@@ -265,7 +265,7 @@ impl OpenJob {
 
 impl Store {
     /// Queue positions and expected ends, provided that this number of slots runs jobs and no job is added.
-    #[boxed]
+    #[boxed_future]
     pub async fn queue_forecast(&self, slots: u32, now: Timestamp) -> Result<QueueForecast> {
         let mut tx = self.database.read.begin().await?;
         let open_jobs = open_jobs(&mut tx).await?;
@@ -311,7 +311,7 @@ impl Store {
     }
 
     /// The backlog of all open evaluations, and the recent durations of jobs.
-    #[boxed]
+    #[boxed_future]
     pub async fn evaluation_backlog(
         &self,
         now: Timestamp,

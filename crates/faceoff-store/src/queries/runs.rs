@@ -2,7 +2,7 @@
 
 use crate::tables::run_plan::RunPlan;
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     store::Store,
     tables::{
@@ -27,13 +27,13 @@ pub struct RunFaults {
 
 impl Store {
     /// The shards of a run with their recording keys, by task and first episode.
-    #[boxed]
+    #[boxed_future]
     pub async fn shards(&self, run: RunId) -> Result<Vec<Shard>> {
         shards::of_run(&mut *self.database.read.acquire().await?, run).await
     }
 
     /// How a run is played.
-    #[boxed]
+    #[boxed_future]
     pub async fn run_plan(&self, run: RunId) -> Result<RunPlan> {
         let row = run_rows::find(&mut *self.database.read.acquire().await?, run).await?;
         Ok(row.plan)
@@ -41,7 +41,7 @@ impl Store {
 
     /// The outcomes of the episodes in a run's committed shards, by task and episode. Scoring needs nothing else, in
     /// particular no recording. [`StoreError::OutcomesRemoved`] if the run was cleared (its shards were removed).
-    #[boxed]
+    #[boxed_future]
     pub async fn outcomes(&self, run: RunId) -> Result<Vec<EpisodeOutcome>> {
         // Both reads are in one transaction: a run that is cleared between them would seem to have no outcomes.
         let mut tx = self.database.read.begin().await?;
@@ -52,7 +52,7 @@ impl Store {
     }
 
     /// The agent faults of a run, with the agent's standard error.
-    #[boxed]
+    #[boxed_future]
     pub async fn run_faults(&self, run: RunId) -> Result<RunFaults> {
         let faulty_shards =
             shards::with_agent_faults(&mut *self.database.read.acquire().await?, run).await?;

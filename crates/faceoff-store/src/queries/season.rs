@@ -1,7 +1,7 @@
 //! Queries of the season, and of the seeds that follow from its secret.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::Result,
     store::Store,
     tables::{
@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 
 impl Store {
     /// The season with its secret.
-    #[boxed]
+    #[boxed_future]
     pub async fn season(&self) -> Result<Season> {
         season::read(&mut *self.database.read.acquire().await?).await
     }

@@ -1,7 +1,7 @@
 //! Queries of the disk usage of teams.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     store::Store,
 };
@@ -67,7 +67,7 @@ impl TryFrom<StorageRow> for TeamStorage {
 
 impl Store {
     /// Disk usage of a team's files, or of all teams by name. It is read from the database, not from the files.
-    #[boxed]
+    #[boxed_future]
     pub async fn storage(
         &self,
         team: Option<TeamId>,

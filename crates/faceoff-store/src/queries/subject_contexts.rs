@@ -1,6 +1,6 @@
 //! The context of an event's subject: the ids that decide who may see the event.
 
-use crate::{boxed, error::Result, event::Subject, readers::ReadConnection, store::Store};
+use crate::{boxed_future, error::Result, event::Subject, readers::ReadConnection, store::Store};
 use faceoff_types::{
     AblationId, EvaluationId, GameId, QuestionId, StageId, SubmissionId, TeamId, TournamentId,
     UserId,
@@ -156,7 +156,7 @@ async fn question_context(
 
 impl Store {
     /// The context of an event's subject, in its current state.
-    #[boxed]
+    #[boxed_future]
     pub async fn subject_context(&self, subject: Subject) -> Result<SubjectContext> {
         Ok(match subject {
             Subject::Season | Subject::Announcement(_) => SubjectContext::Season,

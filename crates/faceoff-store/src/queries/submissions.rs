@@ -1,7 +1,7 @@
 //! Queries of submissions: the agents that teams have uploaded.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::Result,
     store::Store,
     tables::submissions::{self, Submission},
@@ -11,20 +11,20 @@ use jiff::Timestamp;
 
 impl Store {
     /// The submission with this id.
-    #[boxed]
+    #[boxed_future]
     pub async fn submission(&self, id: SubmissionId) -> Result<Submission> {
         submissions::find(&mut *self.database.read.acquire().await?, id).await
     }
 
     /// A team's submissions, the newest first.
-    #[boxed]
+    #[boxed_future]
     pub async fn submissions_of(&self, team: TeamId) -> Result<Vec<Submission>> {
         submissions::of_team(&mut *self.database.read.acquire().await?, team).await
     }
 
     /// One page of a team's submissions, the newest first: the first ones, or those that follow the submission `after`.
     /// `None` if there is no submission `after`.
-    #[boxed]
+    #[boxed_future]
     pub async fn submissions_after(
         &self,
         team: TeamId,
@@ -45,14 +45,14 @@ impl Store {
     }
 
     /// The active submission of each team that may compete, the earliest upload first.
-    #[boxed]
+    #[boxed_future]
     pub async fn active_submissions(&self) -> Result<Vec<Submission>> {
         submissions::active(&mut *self.database.read.acquire().await?).await
     }
 
     /// The tail of the agent's standard error in its validation run; `None` until the run is over, and if
     /// a platform fault ended it.
-    #[boxed]
+    #[boxed_future]
     pub async fn submission_log(&self, id: SubmissionId) -> Result<Option<String>> {
         submissions::log(&mut *self.database.read.acquire().await?, id).await
     }

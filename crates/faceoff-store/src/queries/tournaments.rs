@@ -1,7 +1,7 @@
 //! Queries of tournaments, in which submissions play games against each other in rounds.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::Result,
     store::Store,
     tables::{
@@ -40,18 +40,18 @@ pub struct TournamentRecord {
 
 impl Store {
     /// All tournaments, the oldest first.
-    #[boxed]
+    #[boxed_future]
     pub async fn tournaments(&self) -> Result<Vec<Tournament>> {
         tournaments::all(&mut *self.database.read.acquire().await?).await
     }
 
-    #[boxed]
+    #[boxed_future]
     pub async fn tournament(&self, id: TournamentId) -> Result<Tournament> {
         tournaments::find(&mut *self.database.read.acquire().await?, id).await
     }
 
     /// A tournament with its teams, rounds and their games, read in one transaction.
-    #[boxed]
+    #[boxed_future]
     pub async fn tournament_record(&self, id: TournamentId) -> Result<TournamentRecord> {
         let mut tx = self.database.read.begin().await?;
         Ok(TournamentRecord {
@@ -62,7 +62,7 @@ impl Store {
         })
     }
 
-    #[boxed]
+    #[boxed_future]
     pub async fn games(&self, id: TournamentId, filter: GameFilter) -> Result<Vec<Game>> {
         let mut connection = self.database.read.acquire().await?;
         match filter {
@@ -74,25 +74,25 @@ impl Store {
         }
     }
 
-    #[boxed]
+    #[boxed_future]
     pub async fn game(&self, id: GameId) -> Result<Game> {
         games::find(&mut *self.database.read.acquire().await?, id).await
     }
 
     /// All attempts at a game, in order.
-    #[boxed]
+    #[boxed_future]
     pub async fn game_attempts(&self, id: GameId) -> Result<Vec<GameAttempt>> {
         game_attempts::all(&mut *self.database.read.acquire().await?, id).await
     }
 
     /// The tail of an agent's standard error in the attempt that counts; `None` if no attempt does.
-    #[boxed]
+    #[boxed_future]
     pub async fn game_log(&self, id: GameId, side: Side) -> Result<Option<String>> {
         game_attempts::log(&mut *self.database.read.acquire().await?, id, side).await
     }
 
     /// Does the team decline friendly games that other teams request?
-    #[boxed]
+    #[boxed_future]
     pub async fn declines_friendly_games(&self, team: TeamId) -> Result<bool> {
         friendly_games_declined::declines(&mut *self.database.read.acquire().await?, team).await
     }

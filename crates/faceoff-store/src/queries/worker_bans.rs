@@ -1,7 +1,7 @@
 //! Queries of banned remote workers (on other machines), and of the results to which a worker has contributed.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::Result,
     store::Store,
     tables::worker_bans::{self, WorkerBan},
@@ -19,19 +19,19 @@ pub struct WorkerResults {
 
 impl Store {
     /// All banned workers, by name.
-    #[boxed]
+    #[boxed_future]
     pub async fn worker_bans(&self) -> Result<Vec<WorkerBan>> {
         worker_bans::all(&mut *self.database.read.acquire().await?).await
     }
 
     /// Why the worker is banned; `None` if it is not.
-    #[boxed]
+    #[boxed_future]
     pub async fn ban_reason(&self, worker: &WorkerName) -> Result<Option<String>> {
         worker_bans::reason(&mut *self.database.read.acquire().await?, worker.as_str()).await
     }
 
     /// The counting results to which a remote worker has contributed, at most `limit` of each kind.
-    #[boxed]
+    #[boxed_future]
     pub async fn results_of_worker(
         &self,
         worker: &WorkerName,

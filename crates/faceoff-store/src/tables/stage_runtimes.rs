@@ -16,7 +16,7 @@ impl Stage {
     pub fn runtimes(&self) -> Option<StageRuntimes> {
         Some(StageRuntimes {
             stage: self.name.clone(),
-            runtimes: self.rules.rules.runtimes.clone()?,
+            runtimes: self.revision.rules.runtimes.clone()?,
         })
     }
 

@@ -29,7 +29,7 @@ pub struct Stage {
     /// Everything that scores do not depend on.
     pub settings: StageSettings,
     /// Everything that scores depend on: the current revision.
-    pub rules: Revision,
+    pub revision: Revision,
     /// False if its days began before there were stages; their seeds then derive from the date alone.
     pub seeds_derive_from_id: bool,
     /// Does it take its rules and settings from the server's configuration file?
@@ -128,7 +128,7 @@ impl Stage {
     /// The plan of each team's run on a day, under the current rules.
     #[must_use]
     pub fn plan(&self) -> RunPlan {
-        let rules = &self.rules.rules;
+        let rules = &self.revision.rules;
         RunPlan {
             profile: rules.profile,
             tasks: rules.tasks.clone(),
@@ -180,7 +180,7 @@ impl From<StageRow> for Stage {
             closes_at: row.closes_at.map(|at| at.0),
             zone: row.zone,
             settings: row.settings.0,
-            rules: Revision {
+            revision: Revision {
                 number: row.revision,
                 since: row.since.0,
                 rules: row.rules.0,
@@ -280,7 +280,7 @@ pub(crate) async fn insert(
     .execute(&mut *connection)
     .await
     .map_err(name_error(&stage.name))?;
-    insert_revision(connection, stage.id, &stage.rules).await
+    insert_revision(connection, stage.id, &stage.revision).await
 }
 
 pub(crate) async fn insert_revision(
@@ -366,7 +366,7 @@ mod tests {
                 schedule,
                 ..StageSettings::default()
             },
-            rules: Revision {
+            revision: Revision {
                 number: 1,
                 since: time("2026-03-02T10:00:00Z"),
                 rules: StageRules {

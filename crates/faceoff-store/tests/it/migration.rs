@@ -651,7 +651,7 @@ async fn migration_creates_first_stage_with_revisions() {
     let change = store.configure_stage(rules.clone(), settings, IanaTimeZone::UTC, now);
     change.await.unwrap();
     let stage = store.stages().await.unwrap().remove(0);
-    assert_eq!((stage.rules.number, stage.rules.rules), (3, rules));
+    assert_eq!((stage.revision.number, stage.revision.rules), (3, rules));
 }
 
 #[tokio::test]

@@ -11,12 +11,11 @@ async fn rerun(f: &TestStore, id: EvaluationId) -> Result<Evaluation, StoreError
     f.store.rerun_evaluation(Actor::Operator, id, f.now).await
 }
 
+/// When the newest day of the first stage was released.
 async fn released_at(f: &TestStore) -> Option<jiff::Timestamp> {
-    let newest = f
-        .store
-        .newest_day(f.configure_stage(&six_shard_plan()).await)
-        .await
-        .unwrap();
+    // Configures the first stage again, for its id; a day that has started keeps its plan.
+    let stage = f.configure_stage(&six_shard_plan()).await;
+    let newest = f.store.newest_day(stage).await.unwrap();
     newest.expect("the day has started").released_at
 }
 

@@ -148,7 +148,7 @@ async fn retention_keeps_last_and_best_of_each_team() {
         f.advance_clock_s(DAY_S);
     }
     let stage = first_stage(&f).await;
-    let revision = f.store.stage(stage).await.unwrap().rules.number;
+    let revision = f.store.stage(stage).await.unwrap().revision.number;
     assert_eq!(
         f.store.stage_retention(stage).await.unwrap(),
         Retention::default()
@@ -193,7 +193,7 @@ async fn retention_keeps_last_and_best_of_each_team() {
     let state = f.state(days[0][0]).await;
     assert!(matches!(state, EvaluationState::Finished { result, .. } if result.score == 1.0));
     let stage_after = f.store.stage(stage).await.unwrap();
-    assert_eq!(stage_after.rules.number, revision);
+    assert_eq!(stage_after.revision.number, revision);
     let events = f.store.events_after(0, 10_000).await.unwrap();
     let is_removal = |event: &Event| matches!(event, Event::DatasetRemoved { .. });
     assert_eq!(

@@ -325,7 +325,7 @@ async fn slot_time_is_equal_for_waiting_teams() {
                     .count(),
                 3 + 15 + 60
             );
-            // While all three teams have queued jobs, none is ahead by more than one job per slot.
+            // While all three teams have queued jobs, none is ahead by more than one job per slot and one more.
             for end in 1..sim.job_records.len() {
                 let (before, after) = sim.job_records.split_at(end);
                 let is_waiting = |name| after.iter().any(|job| job.team == name);

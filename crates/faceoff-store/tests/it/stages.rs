@@ -182,7 +182,7 @@ async fn new_rules_of_open_stage_create_revision_and_board() {
 
     let rules = StageRules {
         episodes_per_task: 2,
-        ..stage.rules.rules.clone()
+        ..stage.revision.rules.clone()
     };
     let new_rules = StageChange {
         rules: Some(rules.clone()),
@@ -190,7 +190,10 @@ async fn new_rules_of_open_stage_create_revision_and_board() {
     };
     f.advance_clock_s(60);
     let changed = change_stage(&f, stage.id, new_rules.clone()).await.unwrap();
-    assert_eq!((changed.rules.number, changed.rules.since), (2, f.now));
+    assert_eq!(
+        (changed.revision.number, changed.revision.since),
+        (2, f.now)
+    );
     let unchanged = change_stage(&f, stage.id, new_rules).await.unwrap();
     assert_eq!(unchanged, changed, "identical rules are no change");
     assert_eq!(
@@ -214,7 +217,7 @@ async fn new_rules_of_open_stage_create_revision_and_board() {
         .iter()
         .map(|revision| (revision.number, &revision.rules))
         .collect();
-    assert_eq!(revisions, [(1, &stage.rules.rules), (2, &rules)]);
+    assert_eq!(revisions, [(1, &stage.revision.rules), (2, &rules)]);
     let events = f.store.events_after(0, 1000).await.unwrap();
     let revised = events.iter().filter(|record| {
         record.event
@@ -247,7 +250,7 @@ async fn settings_change_creates_no_revision() {
     let changed = change_stage(&f, stage.id, new_settings).await.unwrap();
     assert_eq!((changed.settings, changed.closes_at), (settings, None));
     assert_eq!(changed.name.as_str(), "Qualifying 2");
-    assert_eq!(changed.rules, stage.rules);
+    assert_eq!(changed.revision, stage.revision);
 }
 
 #[tokio::test]
@@ -276,19 +279,19 @@ async fn first_stage_follows_configuration_until_changed() {
     assert_eq!(
         (
             changed_configuration[0].id,
-            changed_configuration[0].rules.number
+            changed_configuration[0].revision.number
         ),
         (first[0].id, 2)
     );
     assert_eq!(changed_configuration[0].plan(), one_shard_plan());
 
     let request = StageChange {
-        rules: Some(first[0].rules.rules.clone()),
+        rules: Some(first[0].revision.rules.clone()),
         ..StageChange::default()
     };
     // After an organiser's change the configuration no longer applies.
     let changed = change_stage(&f, first[0].id, request).await.unwrap();
-    assert_eq!((changed.rules.number, changed.configured), (3, false));
+    assert_eq!((changed.revision.number, changed.configured), (3, false));
     assert_eq!(configure(&f, &one_shard_plan()).await, [changed]);
 }
 

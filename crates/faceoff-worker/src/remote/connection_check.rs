@@ -4,7 +4,7 @@ use super::{
     connection::{NatsConfig, REQUEST_TIMEOUT},
     names::Names,
 };
-use crate::boxed;
+use crate::boxed_future;
 use anyhow::Context as _;
 use faceoff_wire::remote::{WorkerCapabilities, WorkerRequest, WorkerResponse};
 use std::time::Duration;
@@ -22,7 +22,7 @@ pub struct ConnectionCheck {
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Connects to NATS and asks the server whether a worker with this name and these capabilities would get jobs. Registers nothing.
-#[boxed]
+#[boxed_future]
 pub async fn check_connection(
     nats: &NatsConfig,
     name: &str,

@@ -14,7 +14,7 @@ use super::{
     unfinished_checks::UnfinishedChecks,
 };
 use crate::{
-    boxed,
+    boxed_future,
     local::{LocalServer, to_claim},
     server::{ClaimResult, JobServer},
     slot_supervisor::WorkerConfig,
@@ -87,7 +87,7 @@ impl RemoteConfig {
 ///
 /// # Errors
 /// If the configuration is invalid, or the database cannot be read at the start.
-#[boxed]
+#[boxed_future]
 pub async fn dispatch(
     store: Store,
     live: LiveState,

@@ -59,7 +59,8 @@ impl PendingResults {
         self.pending().remove(&nonce);
     }
 
-    /// Marks a result as being processed, so that its absence from the stream is no loss.
+    /// Marks a result as being processed, so that it does not count as lost, and its job is not queued again, once it has left the
+    /// stream.
     pub(super) fn start_processing(&self, nonce: Uuid) -> ProcessingGuard<'_> {
         self.processing().insert(nonce);
         ProcessingGuard {

@@ -9,7 +9,7 @@ use super::{
     worker_link::WorkerLink,
 };
 use crate::{
-    boxed,
+    boxed_future,
     evaluator::Runner,
     scratch::Scratch,
     server::JobServer,
@@ -47,7 +47,7 @@ const IDLE_CHECK_INTERVAL: Duration = Duration::from_secs(1);
 ///
 /// # Errors
 /// If a name is invalid, the scratch folder cannot be locked, or a slot dies.
-#[boxed]
+#[boxed_future]
 pub async fn run_remote_worker(
     config: RemoteWorkerConfig,
     shutdown: CancellationToken,

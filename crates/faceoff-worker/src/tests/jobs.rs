@@ -126,7 +126,7 @@ async fn jobs_and_ablations_use_the_stages_variation() {
     let id = server.start_evaluation().await;
     // Jobs of the started day keep the old rules.
     let stage = server.store.stages().await.unwrap()[0].clone();
-    let mut changed_variation = stage.rules.rules.variation.clone();
+    let mut changed_variation = stage.revision.rules.variation.clone();
     changed_variation.weights = Some(faceoff_types::TaskWeights::of(faceoff_airhockey::HIT));
     changed_variation
         .perturbations

@@ -1,7 +1,8 @@
 //! `faceoff activate`: makes a submission active.
 
 use super::{
-    next_cutoff::next_cutoff_text, output::print, references::SubmissionArg, server::ServerArgs,
+    next_cutoff::next_cutoff_text, output::print, resource_references::SubmissionArg,
+    server::ServerArgs,
 };
 use clap::Args;
 

@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn missing_folder_is_refused_before_the_content() {
+    fn missing_folder_is_refused_at_creation() {
         let dir = tempfile::tempdir().unwrap();
         let error = AtomicFile::create(&dir.path().join("missing/goal.gif")).unwrap_err();
         assert!(error.to_string().starts_with("creating "), "{error}");

@@ -3,7 +3,9 @@
 
 mod table;
 
-use super::{ca_file::CaFile, output::print_json, references::find_evaluation, server::Connection};
+use super::{
+    ca_file::CaFile, output::print_json, resource_references::find_evaluation, server::Connection,
+};
 use crate::competition::competition;
 use anyhow::{Context, ensure};
 use clap::Args;

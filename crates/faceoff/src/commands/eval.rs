@@ -11,7 +11,7 @@ mod seeds;
 mod server_stage;
 mod table;
 
-use super::{ca_file::CaFile, local_bundle, notes::Notes, output::print};
+use super::{ca_file::CaFile, local_bundle, output::print, side_notes::Notes};
 use crate::competition::{competition, parse_profile, parse_task};
 use crate::config::Config;
 use anyhow::{Context, ensure};

@@ -4,7 +4,7 @@
 use super::{
     evaluation_text::{status_text, task_table},
     output::print,
-    references::EvaluationArg,
+    resource_references::EvaluationArg,
     server::ServerArgs,
 };
 use crate::client::Client;

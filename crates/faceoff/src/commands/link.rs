@@ -3,7 +3,7 @@
 use super::{
     game::own_side,
     output::{print, time_text},
-    references::{EvaluationArg, SubmissionArg},
+    resource_references::{EvaluationArg, SubmissionArg},
     server::ServerArgs,
 };
 use crate::client::LinkTarget;

@@ -11,7 +11,7 @@ mod series;
 mod series_results;
 mod table;
 
-use super::{notes::Notes, series_folders};
+use super::{series_folders, side_notes::Notes};
 use anyhow::{Context, bail};
 use attempt::{Attempt, GamePlayer};
 use bar::Bar;

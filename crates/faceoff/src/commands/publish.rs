@@ -1,6 +1,6 @@
 //! `faceoff publish`: publishes an evaluation of the team before its stage does.
 
-use super::{output::print, references::EvaluationArg, server::ServerArgs};
+use super::{output::print, resource_references::EvaluationArg, server::ServerArgs};
 use clap::Args;
 use faceoff_api::views::evaluation::EvaluationStatus;
 

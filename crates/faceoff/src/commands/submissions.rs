@@ -5,7 +5,7 @@ use super::{
     next_cutoff::next_cutoff_text,
     output::{print, print_download, print_list, time_text},
     queue::queue_text,
-    references::SubmissionArg,
+    resource_references::SubmissionArg,
     server::ServerArgs,
 };
 use crate::client::Client;

@@ -172,7 +172,7 @@ fn print_timing(timing: &ValidationTiming) {
 /// A violated limit, such as `joint position in 3`.
 fn violation_text(violated: &ViolatedLimit) -> String {
     let info = competition().violation(violated.limit);
-    let name = info.map_or(violated.limit.as_str(), |info| info.column.as_str());
+    let name = info.map_or(violated.limit.as_str(), |info| info.column_heading.as_str());
     format!("{name} in {}", violated.episodes)
 }
 

@@ -69,7 +69,7 @@ pub(super) fn whoami_text(caller: &CallerView) -> String {
         None => String::new(),
     };
     format!(
-        "{person}{role}{}, with the token {} ({})",
+        "{person}{role}{}, with the token “{}” ({})",
         of_team.unwrap_or_default(),
         caller.token.name,
         caller.token.id

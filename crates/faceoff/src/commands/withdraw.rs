@@ -1,6 +1,6 @@
 //! `faceoff withdraw`: withdraws a submission.
 
-use super::{references::SubmissionArg, server::ServerArgs, submissions::withdraw};
+use super::{resource_references::SubmissionArg, server::ServerArgs, submissions::withdraw};
 use clap::Args;
 
 /// Withdraws a submission: it is not evaluated any more, unless `faceoff activate` makes it active again.

@@ -2,8 +2,8 @@
 //! job at a time; NATS is the message server between workers and server.
 
 use super::{
-    capabilities::own_capabilities,
     files_client::files_client,
+    reported_capabilities::own_capabilities,
     serve::{check_sandbox, copy_to_memory},
 };
 use crate::{config::Config, log::LogFormat};

@@ -94,6 +94,7 @@ export class Timeline {
 
   private placeMarks(): void {
     if (this.last <= 0) return;
+    // `position`: in control steps, may be fractional.
     const share = (position: number): string =>
       `${(100 * Math.min(Math.max(position / this.last, 0), 1)).toFixed(3)}%`;
     const countByKind = new Map<string, number>();

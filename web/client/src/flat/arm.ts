@@ -60,6 +60,7 @@ function strokeLinks(
   context.lineJoin = "round";
   context.lineWidth = width;
   context.beginPath();
+  // The numbers 9, 10 and 11 of a frame are its origin: x, y, z.
   context.moveTo(projection.x(arm.base[9]), projection.y(arm.base[10]));
   for (const link of arm.links) context.lineTo(projection.x(link[9]), projection.y(link[10]));
   context.stroke();

@@ -29,6 +29,7 @@ export function velocityShare(joint: number, velocity: number): number {
 
 /** Distance of the end effector's height from the edge of its tolerance, m. */
 export function heightMargin(arm: Kinematics): number {
+  // Elements 9, 10 and 11 of a frame are x, y and z of its origin (kinematics.ts).
   const height = arm.heightAboveBase(arm.endEffector[11]);
   return CONSTRAINTS.ee_height_tolerance_m - Math.abs(height - CONSTRAINTS.ee_height_m);
 }

@@ -75,7 +75,7 @@ impl PointMass {
                 violations: vec![ViolationInfo {
                     name: SPEEDING,
                     title: "speed".to_owned(),
-                    column: "too fast".to_owned(),
+                    column_heading: "too fast".to_owned(),
                     short: "fast".to_owned(),
                     description: "too fast".to_owned(),
                     measure: "Speed, m/s beyond the limit.".to_owned(),

@@ -196,11 +196,14 @@ async fn final_preview_names_the_teams_that_advanced() {
     let mut grace = organiser(&cup.site, "Grace").await;
     let page = cup.path.replace("/api/v1", "/organiser");
     let (effects, _) = decide(&mut grace, &page, "start-round").await;
-    assert!(effects.contains("between the 4 teams will be"), "{effects}");
+    assert!(
+        effects.contains("The pairings of the 4 teams will be decided"),
+        "{effects}"
+    );
     assert_eq!(cup.play(first_by_name_wins).await, 2);
     let (effects, target) = decide(&mut grace, &page, "start-round").await;
     assert!(
-        effects.contains("between the teams that advanced from the groups will be"),
+        effects.contains("The pairings of the teams that advanced from the groups will be decided"),
         "{effects}"
     );
     assert_eq!(target, format!("{page}?done=round-started"));

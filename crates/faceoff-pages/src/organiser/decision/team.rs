@@ -69,6 +69,7 @@ impl TeamDecision {
                     } else {
                         "Refuse the registration"
                     },
+                    // A refusal is irreversible; a team that was approved can be disqualified.
                     is_grave: !approves,
                     ..DecisionPreview::new(TEAMS_PATH)
                 })
@@ -82,6 +83,7 @@ impl TeamDecision {
         organiser: &Organiser,
         request: requests::Decision,
     ) -> Result<DecisionOutcome, Problem> {
+        // The name of the organiser in the event log.
         let actor = organiser.actor();
         let reason = request.reason.as_str();
         let notice = match self {
@@ -94,6 +96,7 @@ impl TeamDecision {
                 "reinstated"
             }
             Self::Approve(id) => {
+                // User and token, which are checked again in the transaction: the link that it creates needs a valid creator.
                 let requester = organiser.requester();
                 registrations::approve_registration(app, actor, requester, id).await?;
                 "approved"

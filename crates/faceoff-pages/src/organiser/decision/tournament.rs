@@ -69,8 +69,8 @@ impl TournamentDecision {
                 DecisionPreview {
                     title: format!("Start round {number} of {name}"),
                     effects: format!(
-                        "The games between {} will be drawn and queued. For each of these teams, the submission that is active now \
-                         will play the whole round; later uploads will play in the next one.",
+                        "The pairings of {} will be decided and their games queued. For each of these teams, the submission that is \
+                         active now will play the whole round; later uploads will play in the next one.",
                         round_teams(&record, number)
                     ),
                     button: "Start the round",

@@ -156,7 +156,7 @@ pub(super) static GROUPS: [InputGroup; 4] = [
                 label: "Perturbations",
                 hint: "differences from the simulator that teams have",
                 kind: InputKind::ProfileChoice,
-                text: |stage| stage.rules.rules.profile.to_string(),
+                text: |stage| stage.revision.rules.profile.to_string(),
                 read: |form, patch| parse(form, "profile", &mut patch.profile),
             },
             Input {
@@ -164,7 +164,7 @@ pub(super) static GROUPS: [InputGroup; 4] = [
                 label: "Episodes per task",
                 hint: "",
                 kind: InputKind::Number(1),
-                text: |stage| stage.rules.rules.episodes_per_task.to_string(),
+                text: |stage| stage.revision.rules.episodes_per_task.to_string(),
                 read: |form, patch| {
                     parse_number(form, "episodes_per_task", &mut patch.episodes_per_task)
                 },
@@ -174,7 +174,7 @@ pub(super) static GROUPS: [InputGroup; 4] = [
                 label: "Faults allowed",
                 hint: "agent faults (crashes, invalid or missing answers) in an evaluation; with more, there is no score",
                 kind: InputKind::Number(0),
-                text: |stage| stage.rules.rules.max_faults.to_string(),
+                text: |stage| stage.revision.rules.max_faults.to_string(),
                 read: |form, patch| parse_number(form, "max_faults", &mut patch.max_faults),
             },
         ],

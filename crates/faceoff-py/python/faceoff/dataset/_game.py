@@ -169,7 +169,7 @@ class Game:
 
     @property
     def tables(self) -> tuple[str, ...]:
-        """The names of its tables: `motion`, `rallies`, `side-1`, `entries-1`, …"""
+        """The names of its tables: `motion`, `rallies`, `side-1`, `entries-1` (how the agent of side 1 began each rally), …"""
         names = self.manifest["files"]
         return tuple(n.removesuffix(".parquet") for n in names if n.endswith(".parquet"))
 

@@ -56,7 +56,7 @@ fn links_with_short_names_are_counted() {
 }
 
 #[test]
-fn overhead_is_counted_for_any_reader() {
+fn bytes_that_no_file_explains_are_limited() {
     let (now, never) = (Instant::now, || false);
     let budget = Budget::new(&LIMITS, &now, &never);
     // No file explains these bytes, so all of them are overhead, such as headers and padding.

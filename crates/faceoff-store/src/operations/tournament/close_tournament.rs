@@ -1,7 +1,7 @@
 //! Closing of a tournament, after which its results are final.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     store::Store,
@@ -16,7 +16,7 @@ use jiff::Timestamp;
 impl Store {
     /// Closes a tournament for good. [`StoreError::Conflict`] while a game is open, or a game of a round between two
     /// remaining entrants has no result.
-    #[boxed]
+    #[boxed_future]
     pub async fn close_tournament(
         &self,
         actor: Actor,

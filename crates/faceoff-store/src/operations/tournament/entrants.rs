@@ -2,7 +2,7 @@
 //! disqualification.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::tournament::game_lifecycle,
@@ -118,7 +118,7 @@ async fn latest_round(
 impl Store {
     /// Adds teams to a tournament, from the next round on. [`StoreError::Conflict`] while a round is open, once the groups
     /// are drawn, or if a team is in the tournament already or has left it.
-    #[boxed]
+    #[boxed_future]
     pub async fn add_entrants(
         &self,
         actor: Actor,
@@ -155,7 +155,7 @@ impl Store {
     /// from an earlier round on (`from_round`). Before the first round the team is only removed (`None`) and can be added again. A team that
     /// withdrew can be disqualified later. [`StoreError::Conflict`] if it has left in another way, is not an entrant, or the
     /// tournament is closed.
-    #[boxed]
+    #[boxed_future]
     pub async fn leave_tournament(
         &self,
         actor: Actor,

@@ -1,7 +1,7 @@
 //! Decisions on games: an organiser voids a result, or lets a game be played again.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{job_purpose, tournament::game_lifecycle},
@@ -20,7 +20,7 @@ use jiff::Timestamp;
 impl Store {
     /// Voids the result of a game; its attempt stays. The next round cannot start until the game is rerun.
     /// [`StoreError::Conflict`] unless it is a round's game with a result.
-    #[boxed]
+    #[boxed_future]
     pub async fn void_game(
         &self,
         actor: Actor,
@@ -49,7 +49,7 @@ impl Store {
 
     /// Reruns a game that was voided or ended by a platform fault, with the same submissions and seed.
     /// [`StoreError::Conflict`] for any other game, and if one of its teams had left by its round.
-    #[boxed]
+    #[boxed_future]
     pub async fn rerun_game(&self, actor: Actor, id: GameId, now: Timestamp) -> Result<Game> {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;

@@ -1,7 +1,7 @@
 //! Lifecycle of a tournament's game: it is queued, started in one or more attempts, and ended with or without a result.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Event, Subject},
     operations::{
@@ -193,7 +193,7 @@ pub(super) async fn end_round_if_over(
 
 impl Store {
     /// Stores the result of a game. Idempotent, as [`Store::commit_shard`] is.
-    #[boxed]
+    #[boxed_future]
     pub async fn commit_game(
         &self,
         claim: &JobClaim,

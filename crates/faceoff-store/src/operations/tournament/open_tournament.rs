@@ -1,7 +1,7 @@
 //! Tournaments: their opening, changes and pauses.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     queue,
@@ -67,7 +67,7 @@ impl Store {
     /// Opens a tournament. Rules can be changed until the first round starts; test and friendly games are possible at
     /// once. [`StoreError::TournamentNameTaken`] if another one has its name, [`StoreError::NotFound`] for an unknown
     /// stage or team, [`StoreError::SeasonClosed`].
-    #[boxed]
+    #[boxed_future]
     pub async fn open_tournament(
         &self,
         actor: Actor,
@@ -111,7 +111,7 @@ impl Store {
     }
 
     /// Changes a tournament. [`StoreError::Conflict`] once it is closed; for rules, once a round has started.
-    #[boxed]
+    #[boxed_future]
     pub async fn change_tournament(
         &self,
         actor: Actor,
@@ -166,7 +166,7 @@ impl Store {
 
     /// Pauses a tournament: no game starts, running games continue to their end. [`StoreError::Conflict`] if it is
     /// paused already, or closed.
-    #[boxed]
+    #[boxed_future]
     pub async fn pause_tournament(
         &self,
         actor: Actor,
@@ -192,7 +192,7 @@ impl Store {
     }
 
     /// Resumes a tournament. [`StoreError::Conflict`] if it is not paused.
-    #[boxed]
+    #[boxed_future]
     pub async fn resume_tournament(
         &self,
         actor: Actor,

@@ -1,7 +1,7 @@
 //! Rounds of a tournament: the start of a round, with its draw, its submissions and its games.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
@@ -190,7 +190,7 @@ impl Store {
     /// - The round is not the next one, or a game of an earlier round has no result.
     /// - A team has no valid submission that the tournament accepts; the error names the teams.
     /// - The draw does not match the entrants, or the tournament is closed.
-    #[boxed]
+    #[boxed_future]
     pub async fn start_round(
         &self,
         actor: Actor,

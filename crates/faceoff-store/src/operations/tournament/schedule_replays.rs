@@ -2,7 +2,7 @@
 //! seeds, to show how certain the winner is.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{job_purpose, tournament::game_lifecycle},
@@ -49,7 +49,7 @@ impl Store {
     /// Queues all games of all rounds again, `times` times, with the same submissions and new seeds. The games do not
     /// count and are not recorded. Returns the number of games. [`StoreError::Conflict`] if not all rounds are over, or
     /// beyond [`MAX_SCHEDULE_REPLAYS`] or [`MAX_REPLAYED_GAMES`].
-    #[boxed]
+    #[boxed_future]
     pub async fn request_schedule_replays(
         &self,
         actor: Actor,
@@ -127,7 +127,7 @@ impl Store {
     }
 
     /// Cancels the replays that are not over. Returns the number of games.
-    #[boxed]
+    #[boxed_future]
     pub async fn cancel_schedule_replays(
         &self,
         actor: Actor,

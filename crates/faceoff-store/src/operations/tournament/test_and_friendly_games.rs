@@ -2,7 +2,7 @@
 //! of two teams.
 
 use crate::{
-    boxed,
+    boxed_future,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
@@ -96,7 +96,7 @@ impl Store {
     /// Queues a test game of a team's active submission against the baseline. `asked_by` is `None` for an organiser, who
     /// has no quota. [`StoreError::Conflict`] while a round is open, without a baseline or a valid submission, if the team
     /// is not in the tournament, or the tournament is closed; [`StoreError::GameQuotaExceeded`].
-    #[boxed]
+    #[boxed_future]
     pub async fn request_test_game(
         &self,
         actor: Actor,
@@ -144,7 +144,7 @@ impl Store {
     /// Queues a friendly game between the active submissions of two teams; the requesting team is the home side. Errors
     /// as of [`request_test_game`](Self::request_test_game), and [`StoreError::Conflict`] if the opponent declines
     /// friendly games.
-    #[boxed]
+    #[boxed_future]
     pub async fn request_friendly_game(
         &self,
         actor: Actor,
@@ -192,7 +192,7 @@ impl Store {
     }
 
     /// Cancels a game that does not count and is not over.
-    #[boxed]
+    #[boxed_future]
     pub async fn cancel_game(
         &self,
         actor: Actor,
@@ -217,7 +217,7 @@ impl Store {
     }
 
     /// Sets whether a team declines friendly games that other teams request.
-    #[boxed]
+    #[boxed_future]
     pub async fn set_declines_friendly_games(
         &self,
         actor: Actor,
@@ -241,7 +241,7 @@ impl Store {
 
     /// Number of test and friendly games that a team has requested on the UTC day of `now`, in all tournaments and
     /// including cancelled ones.
-    #[boxed]
+    #[boxed_future]
     pub async fn requested_games_on_day(&self, team: TeamId, now: Timestamp) -> Result<u32> {
         let mut connection = self.database.read.acquire().await?;
         games::count_requested(&mut connection, team, start_of_utc_day(now)).await

@@ -37,7 +37,8 @@ fn immediate_retries() -> TransferTimeouts {
     }
 }
 
-fn never_ends() -> bool {
+/// For `has_ended`: the job goes on for the whole test.
+fn job_never_ends() -> bool {
     false
 }
 
@@ -55,7 +56,7 @@ async fn slow_transfer_with_progress_has_no_time_limit() {
             }
             Ok(())
         },
-        never_ends,
+        job_never_ends,
     );
     result.await.unwrap();
     assert_eq!(attempts.into_inner(), 1);
@@ -73,7 +74,7 @@ async fn buffered_data_extends_the_stall_timeout() {
             sleep(Duration::from_secs(bytes / SLOWEST_BYTES_PER_S)).await;
             Ok(())
         },
-        never_ends,
+        job_never_ends,
     );
     result.await.unwrap();
 }
@@ -87,7 +88,7 @@ async fn stalled_transfer_is_retried_once() {
             attempts.fetch_add(1, Ordering::Relaxed);
             std::future::pending().await
         },
-        never_ends,
+        job_never_ends,
     );
     let error = result.await.unwrap_err();
     assert_eq!(error.to_string(), "no progress for 60 s");
@@ -124,7 +125,7 @@ async fn busy_server_is_retried_for_a_minute() {
                 }
                 .into())
             },
-            never_ends,
+            job_never_ends,
         );
         let error = result.await.unwrap_err();
         assert_eq!(
@@ -210,7 +211,7 @@ async fn upload_is_retried_after_transient_errors() {
         read_body(&mut connection, BYTES).await;
         respond(connection, "204 No Content").await;
     };
-    let stored = files.store(&transfer, "steps.parquet", &path, never_ends);
+    let stored = files.store(&transfer, "steps.parquet", &path, job_never_ends);
     let (stored, ()) = tokio::join!(stored, server);
     stored.unwrap();
 }
@@ -226,7 +227,7 @@ async fn upload_is_given_up_after_many_interruptions() {
             read_body(&mut connection, 1000).await;
         }
     };
-    let stored = files.store(&transfer, "steps.parquet", &path, never_ends);
+    let stored = files.store(&transfer, "steps.parquet", &path, job_never_ends);
     let (stored, ()) = tokio::join!(stored, server);
     assert!(is_connection_error(&stored.unwrap_err()));
 }
@@ -249,7 +250,7 @@ async fn refused_download_is_not_retried() {
         ] {
             let archive: &Path = &folder.path().join("agent.tar.gz");
             let (fetched, ()) = tokio::join!(
-                files.fetch_bundle(&transfer, &bundle, archive, never_ends),
+                files.fetch_bundle(&transfer, &bundle, archive, job_never_ends),
                 async {
                     let (connection, _) = accept(&listener).await;
                     respond(connection, status).await;
@@ -288,7 +289,7 @@ async fn upload_over_a_slow_link_needs_one_attempt() {
         }
         respond(connection, "204 No Content").await;
     };
-    let stored = files.store(&transfer, "steps.parquet", &path, never_ends);
+    let stored = files.store(&transfer, "steps.parquet", &path, job_never_ends);
     let (stored, ()) = tokio::join!(stored, server);
     stored.unwrap();
     assert!(started_at.elapsed() > transfer.timeouts.stall_timeout * 2);

@@ -29,7 +29,7 @@ pub(super) enum ProposalAction {
         /// The id of the trial or proposal
         proposal: ProposalId,
     },
-    /// Evaluate the active submissions by a stage's rules, without effect on boards; all counting jobs run first
+    /// Evaluate the active submissions by a stage's rules, without effect on boards; all jobs whose results count run first
     Trial {
         /// The stage's name or id
         stage: String,
@@ -39,14 +39,14 @@ pub(super) enum ProposalAction {
         #[arg(long, value_name = "ID")]
         submission: Option<SubmissionId>,
     },
-    /// Propose to re-evaluate one counting result, on the same episodes
+    /// Propose to re-evaluate one result that counts, on the same episodes
     Evaluation {
         /// The evaluation's id
         evaluation: EvaluationId,
         /// Shown publicly once the proposal is applied
         reason: String,
     },
-    /// Propose to re-evaluate all counting results of a day, on the same episodes
+    /// Propose to re-evaluate all results of a day that count, on the same episodes
     Day {
         /// The date of the day
         day: Date,
@@ -148,8 +148,8 @@ fn proposal_line(proposal: &ProposalView) -> String {
         _ => "trial".to_owned(),
     };
     let state = match proposal.state {
-        ProposalStateView::Playing => "running",
-        ProposalStateView::Played => "finished, not applied",
+        ProposalStateView::Running => "running",
+        ProposalStateView::Finished => "finished, not applied",
         ProposalStateView::Applied => "applied",
         ProposalStateView::Dropped => "dropped",
     };
@@ -178,7 +178,7 @@ fn proposal_text(proposal: &ProposalView) -> String {
 
 fn evaluation_line(evaluation: &ProposedEvaluationView) -> String {
     let state = match &evaluation.status {
-        ProposedEvaluationStatus::Queued => "queued, after all counting jobs".to_owned(),
+        ProposedEvaluationStatus::Queued => "queued, after all jobs whose results count".to_owned(),
         ProposedEvaluationStatus::Running => format!(
             "running, {} of {} episodes",
             evaluation.progress.episodes_done, evaluation.progress.episodes_total

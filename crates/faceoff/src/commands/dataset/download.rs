@@ -2,7 +2,9 @@
 
 use crate::{
     client::Client,
-    commands::{block_on, output::print_download, references::EvaluationArg, server::ServerArgs},
+    commands::{
+        block_on, output::print_download, resource_references::EvaluationArg, server::ServerArgs,
+    },
 };
 use anyhow::bail;
 use clap::Args;

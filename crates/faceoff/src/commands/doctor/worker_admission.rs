@@ -2,7 +2,7 @@
 
 use super::check::Check;
 use crate::{
-    commands::{capabilities::own_capabilities, worker::host_name},
+    commands::{reported_capabilities::own_capabilities, worker::host_name},
     config::Config,
 };
 use anyhow::Context as _;

@@ -2,8 +2,8 @@
 
 use super::logs::Logs;
 use crate::commands::{
-    notes::Notes,
-    silence::{self, is_silent_start},
+    side_notes::Notes,
+    silent_agent::{self, is_silent_start},
 };
 use anyhow::Context;
 use faceoff_runner::{
@@ -105,7 +105,7 @@ pub(super) fn run_shards(
         let pool = &pool;
         let _guard = AnswerWaitGuard(pool);
         scope.spawn(move || {
-            silence::explain(&["the agent"], &answers, |note| pool.print(note));
+            silent_agent::explain(&["the agent"], &answers, |note| pool.print(note));
         });
         let workers: Vec<_> = envs
             .iter()

@@ -6,7 +6,7 @@ use super::{
     pool::{EvalOutcome, Job, run_shards},
 };
 use crate::{
-    commands::{notes::Notes, silence},
+    commands::{side_notes::Notes, silent_agent},
     competition::{competition, simulator},
 };
 use anyhow::{Context, bail};
@@ -75,7 +75,7 @@ pub(super) fn run_profile(
             print_first_output(setup.notes, &fault, &logs);
             bail!(
                 "{}\nThe agent's log is in {}",
-                silence::stop_reason("the agent", "evaluation", &fault),
+                silent_agent::stop_reason("the agent", "evaluation", &fault),
                 path.display()
             );
         }

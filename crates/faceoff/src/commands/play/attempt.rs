@@ -2,8 +2,8 @@
 
 use super::{bar::Bar, matchup::Matchup, table};
 use crate::commands::{
-    notes::Notes,
-    silence::{self, is_silent_start},
+    side_notes::Notes,
+    silent_agent::{self, is_silent_start},
 };
 use faceoff_airhockey::{GameStepRow, RallyRow};
 use faceoff_runner::{GameObserver, GameReport, PlatformFault};
@@ -70,7 +70,7 @@ impl<'a> GamePlayer<'a> {
         let played = thread::scope(|scope| {
             let names = names.each_ref().map(String::as_str);
             scope.spawn(move || {
-                silence::explain(&names, &ended_starts, |note| {
+                silent_agent::explain(&names, &ended_starts, |note| {
                     printer.suspend(|| notes.print(note));
                 });
             });
@@ -101,7 +101,7 @@ impl<'a> GamePlayer<'a> {
                         notes.print(format_args!("{}", table::log_tail(side, &log).trim_end()));
                     }
                 });
-                let reason = silence::stop_reason(name, "game", &fault);
+                let reason = silent_agent::stop_reason(name, "game", &fault);
                 Err(AttemptError::Silent(reason))
             }
             (played, _) => Ok(played?),

@@ -10,7 +10,7 @@ use super::{
     series_results::{Series, SeriesGame, SeriesKind, SeriesResults},
     table,
 };
-use crate::commands::{notes::Notes, series_folders};
+use crate::commands::{series_folders, side_notes::Notes};
 use anyhow::Context;
 use faceoff_dataset::game::GAME_FILE;
 use faceoff_runner::{GameReport, PlatformFault};

@@ -2,7 +2,7 @@
 //! server, and transfer files through the server itself or through a *bucket*, an object store (S3).
 
 use crate::{
-    commands::{capabilities::own_capabilities, files_client::bucket_client},
+    commands::{files_client::bucket_client, reported_capabilities::own_capabilities},
     config::Config,
 };
 use faceoff_http::LinkKey;

@@ -36,7 +36,7 @@ pub fn copy_to_memory(
     runtimes: &mut BTreeMap<String, Runtime>,
     limit_bytes: u64,
 ) -> Option<MemoryImage> {
-    faceoff_sandbox::sweep_stale();
+    faceoff_sandbox::remove_remains_of_dead_services();
     match MemoryImage::make(runtimes, limit_bytes) {
         Ok(image) => {
             tracing::info!(bytes = image.bytes, folder = %image.folder().display(), "runtime files are held in memory");

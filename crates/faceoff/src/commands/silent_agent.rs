@@ -1,4 +1,4 @@
-//! Explains the silence of an agent whose process runs and does not answer `hello`.
+//! An agent whose process runs and does not answer `hello`: the likely causes.
 
 use faceoff_types::{AgentFault, AgentFaultKind, Phase};
 use std::{

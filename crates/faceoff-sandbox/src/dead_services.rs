@@ -14,13 +14,13 @@ pub(crate) const SCRATCH_PREFIX: &str = "faceoff-scratch-";
 /// Living services, including this one, keep theirs. Returns the number of removed items.
 ///
 /// A service's first spawn calls it automatically; a call at start-up frees the memory earlier.
-pub fn sweep_stale() -> usize {
-    cgroup::sweep()
-        + sweep_folder(&std::env::temp_dir(), SCRATCH_PREFIX)
-        + sweep_folder(Path::new(MEMORY_FOLDER), IMAGE_PREFIX)
+pub fn remove_remains_of_dead_services() -> usize {
+    cgroup::remove_stale_leaves()
+        + remove_stale_folders(&std::env::temp_dir(), SCRATCH_PREFIX)
+        + remove_stale_folders(Path::new(MEMORY_FOLDER), IMAGE_PREFIX)
 }
 
-fn sweep_folder(folder: &Path, prefix: &str) -> usize {
+fn remove_stale_folders(folder: &Path, prefix: &str) -> usize {
     let mut removed = 0;
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();
