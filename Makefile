@@ -25,7 +25,7 @@ COMMIT   ?= HEAD
 JSON     ?=
 
 # Tests spend much of their time waiting, so more run at once than there are CPUs.
-TEST_THREADS ?= $(shell echo $$((4 * $$(nproc))))
+TEST_THREADS ?= $(shell echo $$((3 * $$(nproc))))
 
 CARGO      ?= cargo
 # Paths may contain spaces. So recipes quote these variables, and none is a target, a prerequisite or an argument of a make function, which

@@ -278,7 +278,7 @@ fn violation(
     ViolationInfo {
         name,
         title: title.to_owned(),
-        column: description.to_owned(),
+        column_heading: description.to_owned(),
         description: description.to_owned(),
         short: short.to_owned(),
         measure: measure.to_owned(),
