@@ -92,7 +92,7 @@ async fn tournament_is_run_with_forms_alone() {
         format!("{page}?done=teams-entered")
     );
     let (effects, target) = decide(&mut grace, page, "start-round").await;
-    assert!(effects.contains("between the 3 teams"), "{effects}");
+    assert!(effects.contains("pairings of the 3 teams"), "{effects}");
     assert_eq!(target, format!("{page}?done=round-started"));
     let html = dashboard_page(&grace.open(&target).await, 200);
     assert!(texts(&html, "[role=status]")[0].contains("The round has started"));
