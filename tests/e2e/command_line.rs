@@ -110,7 +110,7 @@ fn sign_in_and_sign_out_never_print_the_token() {
     let by_password = ["login", &server.url, "--name", "Ada", "--password-stdin"];
     ada(&by_password, "something else entirely\n").expect_refusal(NOT_ALLOWED, &["401"]);
     let output = ada(&by_password, PASSWORD).expect_success();
-    assert!(output.contains("with the token faceoff login"), "{output}");
+    assert!(output.contains("with the token “faceoff login"), "{output}");
     let tokens = ada(&["token", "list", "--json"], "").json();
     let sessions = tokens
         .as_array()
