@@ -60,7 +60,7 @@ pub(crate) fn skip_some(started: u32) {
     if getrandom(&mut random, GetRandomFlags::empty()).is_err() {
         return;
     }
-    // Otherwise each process is started on another CPU, which must wake up first. Without this the numbers are skipped, too, but later.
+    // On several CPUs the skipping takes longer, since an idle CPU must wake up for a process. If pinning fails, only time is lost.
     let _ = affinity::pin_current_thread(&[sched_getcpu()]);
     let limit = MAX_SKIPPED.max(started.saturating_mul(MAX_SKIPPED_PER_SESSION));
     for _ in 0..u32::from_ne_bytes(random) % limit {
