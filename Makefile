@@ -141,7 +141,7 @@ tests-built:
 tests-of-rust:
 	+if $(CARGO) nextest --version >/dev/null 2>&1; \
 	    then $(CARGO) nextest run --locked --workspace --lib --bins --tests --no-fail-fast --test-threads $(TEST_THREADS); \
-	    else $(CARGO) test --locked --workspace --lib --bins --tests --no-fail-fast -- --test-threads $(TEST_THREADS); fi
+	    else $(CARGO) test --locked --workspace --no-fail-fast -- --test-threads $(TEST_THREADS); fi
 tests-of-python:
 	python3 tests/costs/compiled_once.py
 	TARGET_DIR="$(TARGET_DIR)" crates/faceoff-py/test.sh test
